@@ -1,0 +1,1 @@
+//! Reads volumes and maps, writes pictures.

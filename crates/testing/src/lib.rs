@@ -1,0 +1,1 @@
+//! Statistical tests and picture comparison: numbers in, verdict out; knows no renderer.

@@ -1,0 +1,43 @@
+//! The number conversions that may lose bits, in one place, each saying what it does with them.
+
+/// Rounds down; saturates at the ends of `i32`; NaN becomes 0.
+#[inline]
+#[must_use]
+#[expect(clippy::cast_possible_truncation, reason = "`as` saturates, which is what is documented")]
+pub fn floor_i32(x: f32) -> i32 {
+    x.floor() as i32
+}
+
+/// Cuts the fraction of a non-negative number off; negative numbers and NaN become 0.
+#[inline]
+#[must_use]
+#[expect(clippy::cast_possible_truncation, reason = "`as` saturates, which is what is documented")]
+pub fn index(x: f32) -> usize {
+    x as usize
+}
+
+/// Nearest single-precision number.
+#[inline]
+#[must_use]
+#[expect(clippy::cast_possible_truncation, reason = "rounding to nearest is the purpose")]
+pub fn single(x: f64) -> f32 {
+    x as f32
+}
+
+/// The low 32 bits, for hashing and counters.
+#[inline]
+#[must_use]
+#[expect(clippy::cast_possible_truncation, reason = "keeping the low half is the purpose")]
+pub fn low_u32(x: u64) -> u32 {
+    x as u32
+}
+
+/// An index known to fit 32 bits, because the film and the grids are bounded far below.
+///
+/// # Panics
+/// If it does not fit: a broken invariant, never user data.
+#[inline]
+#[must_use]
+pub fn fit_u32(x: usize) -> u32 {
+    u32::try_from(x).expect("index within 32 bits")
+}
