@@ -5,3 +5,4 @@
 
 pub mod math;
 pub mod sampling;
+pub mod volume;

@@ -52,8 +52,7 @@ impl Interval {
     #[inline]
     #[must_use]
     pub fn is_empty(self) -> bool {
-        // Written so that NaN counts as empty.
-        !(self.start < self.end)
+        self.start >= self.end || self.start.is_nan() || self.end.is_nan()
     }
 
     /// The common part of both.

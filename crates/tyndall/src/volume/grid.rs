@@ -1,0 +1,255 @@
+//! Where the voxels lie: dimensions and the map between index space and the world.
+
+use crate::math::{Affine3A, Bounds, DMat3, DVec3, Mat3, Ray, Vec3, cast};
+
+/// Which way is up, and what the axes mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Space {
+    /// LPS millimetres: +x to the patient's left, +y to the back, +z up to the head.
+    Anatomical,
+    /// No meaning beyond the file's own axes; +y is up.
+    Plain,
+}
+
+impl Space {
+    /// Unit vector that points up.
+    #[must_use]
+    pub fn up(self) -> Vec3 {
+        match self {
+            Self::Anatomical => Vec3::Z,
+            Self::Plain => Vec3::Y,
+        }
+    }
+}
+
+/// A regular grid of voxels: index space has integer coordinates at voxel centres, and
+/// `world = origin + direction * (spacing * index)`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    dims: [usize; 3],
+    spacing: [f64; 3],
+    direction: [[f64; 3]; 3],
+    origin: [f64; 3],
+    space: Space,
+    index_to_world: Affine3A,
+    world_to_index: Affine3A,
+    gradient_to_world: Mat3,
+    voxel_size: f32,
+}
+
+/// Why a grid cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GridError {
+    /// An axis has no voxel, or more than 2^24, past which single precision no longer tells voxels apart.
+    #[error("dimensions {0:?}: expected 1 to 16777216 voxels along each axis")]
+    Dims([usize; 3]),
+    /// The number of voxels overflows the address space.
+    #[error("dimensions {0:?}: their product overflows")]
+    Overflow([usize; 3]),
+    /// A spacing is not a positive number of usable size.
+    #[error("spacing {0:?}: expected positive finite numbers between 1e-15 and 1e15")]
+    Spacing([f64; 3]),
+    /// The origin is not finite.
+    #[error("origin {0:?}: expected finite numbers of at most 1e15")]
+    Origin([f64; 3]),
+    /// The axes do not span space.
+    #[error("direction {0:?} is singular: its columns must be three independent unit vectors")]
+    Direction([[f64; 3]; 3]),
+}
+
+const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+impl Grid {
+    /// A grid with unit directions, unit spacing and its box centred on the world origin.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn centred(dims: [usize; 3], spacing: [f64; 3]) -> Result<Self, GridError> {
+        let origin = std::array::from_fn(|a| -0.5 * (dims[a] as f64 - 1.0) * spacing[a]);
+        Self::new(dims, spacing, IDENTITY, origin, Space::Plain)
+    }
+
+    /// From what a file says: `direction` as rows of a 3x3 matrix whose column `j` is the world
+    /// direction of index axis `j` (unit length; a left-handed matrix is fine).
+    ///
+    /// # Errors
+    /// [`GridError`] names the part that cannot be.
+    pub fn new(
+        dims: [usize; 3],
+        spacing: [f64; 3],
+        direction: [[f64; 3]; 3],
+        origin: [f64; 3],
+        space: Space,
+    ) -> Result<Self, GridError> {
+        if dims.iter().any(|&n| n == 0 || n > 1 << 24) {
+            return Err(GridError::Dims(dims));
+        }
+        if dims.iter().try_fold(1_usize, |a, &n| a.checked_mul(n)).is_none() {
+            return Err(GridError::Overflow(dims));
+        }
+        // The comparison is false for NaN, which is then refused too.
+        if !spacing.iter().all(|&s| (1e-15..=1e15).contains(&s)) {
+            return Err(GridError::Spacing(spacing));
+        }
+        if !origin.iter().all(|o| o.abs() <= 1e15) {
+            return Err(GridError::Origin(origin));
+        }
+        let axes = DMat3::from_cols_array_2d(&direction).transpose();
+        if !axes.is_finite() || axes.determinant().abs() < 1e-6 {
+            return Err(GridError::Direction(direction));
+        }
+        let linear = axes * DMat3::from_diagonal(DVec3::from_array(spacing));
+        let inverse = linear.inverse();
+        let shift = DVec3::from_array(origin);
+        let single = |m: DMat3, t: DVec3| Affine3A::from_mat3_translation(m.as_mat3(), t.as_vec3());
+        Ok(Self {
+            dims,
+            spacing,
+            direction,
+            origin,
+            space,
+            index_to_world: single(linear, shift),
+            world_to_index: single(inverse, -(inverse * shift)),
+            gradient_to_world: inverse.transpose().as_mat3(),
+            voxel_size: cast::single(linear.determinant().abs().cbrt()),
+        })
+    }
+
+    /// Voxels along x, y, z; x is fastest in memory.
+    #[must_use]
+    pub fn dims(&self) -> [usize; 3] {
+        self.dims
+    }
+
+    /// Number of voxels.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.dims.iter().product()
+    }
+
+    /// Never: a grid has at least one voxel.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// Distance of voxel centres along each axis, world units.
+    #[must_use]
+    pub fn spacing(&self) -> [f64; 3] {
+        self.spacing
+    }
+
+    /// Rows of the direction matrix.
+    #[must_use]
+    pub fn direction(&self) -> [[f64; 3]; 3] {
+        self.direction
+    }
+
+    /// World place of the centre of voxel (0, 0, 0).
+    #[must_use]
+    pub fn origin(&self) -> [f64; 3] {
+        self.origin
+    }
+
+    /// What the axes mean.
+    #[must_use]
+    pub fn space(&self) -> Space {
+        self.space
+    }
+
+    /// Cube root of the voxel volume, world units: the `h` of the scattering function and of step sizes.
+    #[must_use]
+    pub fn voxel_size(&self) -> f32 {
+        self.voxel_size
+    }
+
+    /// The medium's box in index space, half a voxel past the outer centres.
+    #[must_use]
+    pub fn index_bounds(&self) -> Bounds {
+        let last = Vec3::from_array(self.dims.map(|n| n as f32 - 0.5));
+        Bounds::new(Vec3::splat(-0.5), last)
+    }
+
+    /// The eight corners of the medium's box in the world.
+    #[must_use]
+    pub fn world_corners(&self) -> [Vec3; 8] {
+        self.index_bounds().corners().map(|p| self.index_to_world(p))
+    }
+
+    /// The smallest axis-aligned world box around the medium.
+    #[must_use]
+    pub fn world_bounds(&self) -> Bounds {
+        Bounds::around(self.world_corners())
+    }
+
+    /// The length of the medium box's diagonal, world units.
+    #[must_use]
+    pub fn diagonal(&self) -> f32 {
+        let c = self.world_corners();
+        [(0, 7), (1, 6), (2, 5), (4, 3)].iter().map(|&(a, b)| c[a].distance(c[b])).fold(0.0, f32::max)
+    }
+
+    /// Index coordinates to world.
+    #[inline]
+    #[must_use]
+    pub fn index_to_world(&self, p: Vec3) -> Vec3 {
+        self.index_to_world.transform_point3(p)
+    }
+
+    /// World coordinates to index.
+    #[inline]
+    #[must_use]
+    pub fn world_to_index(&self, p: Vec3) -> Vec3 {
+        self.world_to_index.transform_point3(p)
+    }
+
+    /// A world ray in index space; its parameter stays the world distance.
+    #[inline]
+    #[must_use]
+    pub fn ray_to_index(&self, ray: &Ray) -> Ray {
+        Ray::new(
+            self.world_to_index.transform_point3(ray.origin),
+            self.world_to_index.transform_vector3(ray.direction),
+        )
+    }
+
+    /// A gradient per index unit turned into one per world unit (inverse transpose).
+    #[inline]
+    #[must_use]
+    pub fn gradient_to_world(&self, g: Vec3) -> Vec3 {
+        self.gradient_to_world * g
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_skewed_grid_maps_there_and_back() {
+        let (s, c) = 0.3_f64.sin_cos();
+        let direction = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, -1.0]];
+        let grid =
+            Grid::new([4, 5, 6], [0.5, 2.0, 3.0], direction, [10.0, -20.0, 5.0], Space::Anatomical).unwrap();
+        let p = Vec3::new(1.0, 2.5, 3.0);
+        let world = grid.index_to_world(p);
+        let expected_x = 10.0 + c * 0.5 - s * 5.0;
+        assert!((f64::from(world.x) - expected_x).abs() < 1e-5, "{world}");
+        assert!((grid.world_to_index(world) - p).length() < 1e-4);
+        assert!((grid.voxel_size() - 3.0_f32.cbrt()).abs() < 1e-6);
+        // A field v = i (index x) grows by 1 per 0.5 world units along the first axis.
+        let g = grid.gradient_to_world(Vec3::X);
+        assert!((g.length() - 2.0).abs() < 1e-5 && (f64::from(g.x) - 2.0 * c).abs() < 1e-5, "{g}");
+    }
+
+    #[test]
+    fn impossible_grids_are_refused() {
+        let new = |dims, spacing| Grid::new(dims, spacing, IDENTITY, [0.0; 3], Space::Plain);
+        assert!(matches!(new([0, 1, 1], [1.0; 3]), Err(GridError::Dims(_))));
+        assert!(matches!(new([1, 1, 1], [1.0, -1.0, 1.0]), Err(GridError::Spacing(_))));
+        assert!(matches!(new([1, 1, 1], [f64::NAN; 3]), Err(GridError::Spacing(_))));
+        let flat = [[1.0, 1.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+        let flat = Grid::new([2, 2, 2], [1.0; 3], flat, [0.0; 3], Space::Plain);
+        assert!(matches!(flat, Err(GridError::Direction(_))));
+    }
+}

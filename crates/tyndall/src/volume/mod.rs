@@ -1,0 +1,224 @@
+//! A volume: samples on a grid, and the continuous field between them.
+//!
+//! Values are *data values*: what the file means, after slope and intercept. The field is trilinear
+//! between voxel centres (or nearest), and clamped to the edge value in the half voxel around them.
+
+mod bricks;
+mod grid;
+mod interpolation;
+mod statistics;
+mod voxels;
+
+pub mod procedural;
+
+pub use bricks::Bricks;
+pub use grid::{Grid, GridError, Space};
+pub use interpolation::Interpolation;
+pub use statistics::Histogram;
+pub use voxels::{Voxel, Voxels};
+
+use crate::math::{Vec3, cast};
+use std::sync::Arc;
+use voxels::with_voxels;
+
+/// `value = slope * stored + intercept`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ValueMap {
+    /// Data units per stored unit; not zero.
+    pub slope: f64,
+    /// Data value of a stored zero.
+    pub intercept: f64,
+}
+
+impl ValueMap {
+    /// Stored samples are the data values.
+    pub const IDENTITY: Self = Self { slope: 1.0, intercept: 0.0 };
+
+    /// The data value of a stored sample.
+    #[must_use]
+    pub fn apply(self, stored: f64) -> f64 {
+        self.slope * stored + self.intercept
+    }
+}
+
+/// Why samples and grid do not make a volume.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum VolumeError {
+    /// The number of samples does not fit the dimensions.
+    #[error("{found} samples, but dimensions {dims:?} ask for {expected}")]
+    Samples {
+        /// Samples given.
+        found: usize,
+        /// Product of the dimensions.
+        expected: usize,
+        /// The dimensions.
+        dims: [usize; 3],
+    },
+    /// Slope or intercept cannot be used.
+    #[error("slope {slope} and intercept {intercept}: expected finite numbers, the slope not zero")]
+    ValueMap {
+        /// The slope found.
+        slope: f64,
+        /// The intercept found.
+        intercept: f64,
+    },
+}
+
+/// Samples on a grid with what is derived from them. Cheap to clone: the samples are shared.
+#[derive(Clone, Debug)]
+pub struct Volume {
+    grid: Grid,
+    voxels: Arc<Voxels>,
+    values: ValueMap,
+    interpolation: Interpolation,
+    value_range: [f64; 2],
+    robust_range: [f64; 2],
+    non_finite: u64,
+    bricks: Arc<Bricks>,
+    slope: f32,
+    intercept: f32,
+}
+
+impl Volume {
+    /// Takes the samples over, replaces what is not finite (see [`Self::non_finite`]), and derives
+    /// the ranges and the bricks, in parallel on the current thread pool.
+    ///
+    /// # Errors
+    /// [`VolumeError`] if the number of samples, the slope or the intercept cannot be.
+    pub fn new(grid: Grid, mut voxels: Voxels, values: ValueMap) -> Result<Self, VolumeError> {
+        if voxels.len() != grid.len() {
+            return Err(VolumeError::Samples {
+                found: voxels.len(),
+                expected: grid.len(),
+                dims: grid.dims(),
+            });
+        }
+        let ValueMap { slope, intercept } = values;
+        if !slope.is_finite() || slope == 0.0 || !intercept.is_finite() {
+            return Err(VolumeError::ValueMap { slope, intercept });
+        }
+        let non_finite = voxels.mend_non_finite(slope);
+        let value_range = statistics::value_range(&voxels, values);
+        let robust_range = statistics::robust_range(&voxels, values, value_range);
+        let bricks = Bricks::new(&grid, &voxels, values, Bricks::CELL);
+        Ok(Self {
+            grid,
+            voxels: Arc::new(voxels),
+            values,
+            interpolation: Interpolation::Linear,
+            value_range,
+            robust_range,
+            non_finite,
+            bricks: Arc::new(bricks),
+            slope: cast::single(slope),
+            intercept: cast::single(intercept),
+        })
+    }
+
+    /// The same volume read another way between voxel centres.
+    #[must_use]
+    pub fn with_interpolation(mut self, interpolation: Interpolation) -> Self {
+        self.interpolation = interpolation;
+        self
+    }
+
+    /// How the field is read between voxel centres.
+    #[must_use]
+    pub fn interpolation(&self) -> Interpolation {
+        self.interpolation
+    }
+
+    /// Where the voxels lie.
+    #[must_use]
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The stored samples.
+    #[must_use]
+    pub fn voxels(&self) -> &Voxels {
+        &self.voxels
+    }
+
+    /// Slope and intercept.
+    #[must_use]
+    pub fn value_map(&self) -> ValueMap {
+        self.values
+    }
+
+    /// Exact smallest and largest data value.
+    #[must_use]
+    pub fn value_range(&self) -> [f64; 2] {
+        self.value_range
+    }
+
+    /// The range without the outermost 0.1 % of the samples on each side, so that a few outliers
+    /// ruin nothing; the exact range where that would leave a single value.
+    #[must_use]
+    pub fn robust_range(&self) -> [f64; 2] {
+        self.robust_range
+    }
+
+    /// How many samples were NaN or infinite in the file.
+    #[must_use]
+    pub fn non_finite(&self) -> u64 {
+        self.non_finite
+    }
+
+    /// Smallest and largest value per cell of [`Bricks::CELL`] voxels.
+    #[must_use]
+    pub fn bricks(&self) -> &Bricks {
+        &self.bricks
+    }
+
+    /// Bricks of another cell size; `0` is one cell around everything.
+    #[must_use]
+    pub fn bricks_of(&self, cell: usize) -> Arc<Bricks> {
+        if cell == Bricks::CELL {
+            return self.bricks.clone();
+        }
+        Arc::new(Bricks::new(&self.grid, &self.voxels, self.values, cell))
+    }
+
+    /// Counts of the data values in equal bins over `range`; values outside count in the end bins.
+    #[must_use]
+    pub fn histogram(&self, range: [f64; 2], bins: usize) -> Histogram {
+        Histogram::new(&self.voxels, self.values, range, bins)
+    }
+
+    /// The data value at a voxel.
+    ///
+    /// # Panics
+    /// If the voxel is outside the grid.
+    #[must_use]
+    pub fn voxel(&self, [x, y, z]: [usize; 3]) -> f64 {
+        let [nx, ny, nz] = self.grid.dims();
+        assert!(x < nx && y < ny && z < nz, "voxel ({x}, {y}, {z}) outside {nx} x {ny} x {nz}");
+        self.values.apply(self.voxels.get(x + nx * (y + ny * z)))
+    }
+
+    /// The data value at a point of index space, clamped to the edge outside.
+    #[inline]
+    #[must_use]
+    pub fn value(&self, p: Vec3) -> f32 {
+        let dims = self.grid.dims();
+        let stored = match self.interpolation {
+            Interpolation::Linear => {
+                with_voxels!(&*self.voxels, data => interpolation::linear(data, dims, p))
+            }
+            Interpolation::Nearest => {
+                with_voxels!(&*self.voxels, data => interpolation::nearest(data, dims, p))
+            }
+        };
+        self.slope * stored + self.intercept
+    }
+
+    /// Gradient of the field per world unit, by central differences of points one voxel apart
+    /// (half a voxel to each side along every index axis).
+    #[inline]
+    #[must_use]
+    pub fn gradient(&self, p: Vec3) -> Vec3 {
+        let along = |axis: Vec3| self.value(p + axis * 0.5) - self.value(p - axis * 0.5);
+        self.grid.gradient_to_world(Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z)))
+    }
+}
