@@ -5,4 +5,5 @@
 
 pub mod math;
 pub mod sampling;
+pub mod transfer;
 pub mod volume;

@@ -1,3 +1,15 @@
 //! Random numbers and the warps that turn them into directions and points.
+//!
+//! Every number comes from a counter, never from shared state: a path that is traced again draws the
+//! same numbers, on any thread.
 
+mod discrete;
+mod philox;
+mod sampler;
+mod stream;
 pub mod warp;
+
+pub use discrete::Discrete;
+pub use philox::philox;
+pub use sampler::{BounceSample, PathSampler};
+pub use stream::Stream;

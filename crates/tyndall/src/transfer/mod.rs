@@ -1,0 +1,288 @@
+//! The transfer function: what a data value looks like to light.
+//!
+//! Piecewise linear between points, clamped outside them; two points at one value are a jump, of
+//! which the later holds from there. It is evaluated exactly, segment by segment, so there is no
+//! table whose error would have to be bounded; a small index finds the segment in constant time.
+
+use crate::math::{Rgb, cast};
+
+/// The optics of matter at one data value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Optics {
+    /// Multiplies the medium's density to give extinction; 0 to 1.
+    pub opacity: f32,
+    /// Share of the extinguished light that is scattered, per channel; 0 to 1.
+    pub albedo: Rgb,
+    /// Emitted radiance of matter in thermal balance, `Le`; at least 0.
+    pub emission: Rgb,
+    /// How much of the scattering is a reflection where the gradient is strong; 0 to 1.
+    pub surface: f32,
+    /// Reflectance at normal incidence of glossy BRDFs; 0 to 1.
+    pub specular: Rgb,
+    /// Roughness of glossy BRDFs; 0 to 1.
+    pub roughness: f32,
+    /// Refractive index; read by `refractive` alone.
+    pub ior: f32,
+}
+
+impl Default for Optics {
+    /// The scene document's defaults; opaque.
+    fn default() -> Self {
+        Self {
+            opacity: 1.0,
+            albedo: Rgb::splat(0.8),
+            emission: Rgb::BLACK,
+            surface: 0.0,
+            specular: Rgb::splat(0.04),
+            roughness: 0.3,
+            ior: 1.0,
+        }
+    }
+}
+
+impl Optics {
+    /// From `self` (t = 0) to `other` (t = 1), every quantity by itself.
+    #[inline]
+    #[must_use]
+    pub fn lerp(&self, other: &Self, t: f32) -> Self {
+        let mix = |a: f32, b: f32| a + (b - a) * t;
+        Self {
+            opacity: mix(self.opacity, other.opacity),
+            albedo: self.albedo.lerp(other.albedo, t),
+            emission: self.emission.lerp(other.emission, t),
+            surface: mix(self.surface, other.surface),
+            specular: self.specular.lerp(other.specular, t),
+            roughness: mix(self.roughness, other.roughness),
+            ior: mix(self.ior, other.ior),
+        }
+    }
+}
+
+/// A point of the function.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Data value.
+    pub value: f32,
+    /// Optics there.
+    pub optics: Optics,
+}
+
+/// Why points do not make a function.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum TransferError {
+    /// No point was given.
+    #[error("a transfer function needs at least one point")]
+    Empty,
+    /// Values fall, are not finite, or more than two points share one.
+    #[error("point {index}: values must be finite and ascend, with at most two points at one value")]
+    Order {
+        /// The offending point, counted from 0.
+        index: usize,
+    },
+}
+
+/// Data value to optics. See the module.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TransferFunction {
+    points: Vec<Point>,
+    /// Per bin over the points' span: the last point at or below the bin's lower end.
+    segments: Vec<u32>,
+    bins_per_value: f32,
+}
+
+/// Bins of the segment index.
+const BINS: usize = 256;
+
+impl TransferFunction {
+    /// # Errors
+    /// [`TransferError`] if there is no point or the values do not ascend.
+    pub fn new(points: Vec<Point>) -> Result<Self, TransferError> {
+        let (Some(first), Some(last)) = (points.first(), points.last()) else {
+            return Err(TransferError::Empty);
+        };
+        for (index, point) in points.iter().enumerate() {
+            let falls = index > 0 && point.value < points[index - 1].value;
+            let third = index > 1 && point.value <= points[index - 2].value;
+            if !point.value.is_finite() || falls || third {
+                return Err(TransferError::Order { index });
+            }
+        }
+        let span = last.value - first.value;
+        let bins_per_value = if span > 0.0 { BINS as f32 / span } else { 0.0 };
+        let lower_end = |bin: usize| first.value + span * (bin as f32 / BINS as f32);
+        let segments = (0..=BINS)
+            // One bin back, so that rounding of the bin number never skips a point.
+            .map(|bin| points.partition_point(|p| p.value <= lower_end(bin.saturating_sub(1))))
+            .map(|after| cast::fit_u32(after.saturating_sub(1)))
+            .collect();
+        Ok(Self { points, segments, bins_per_value })
+    }
+
+    /// The points, ascending.
+    #[must_use]
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// The segment that holds `value`: its two points and the place between them.
+    #[inline]
+    fn locate(&self, value: f32) -> (&Point, &Point, f32) {
+        let bin = cast::index((value - self.points[0].value) * self.bins_per_value).min(BINS);
+        let mut i = self.segments[bin] as usize;
+        while i + 1 < self.points.len() && self.points[i + 1].value <= value {
+            i += 1;
+        }
+        let a = &self.points[i];
+        let b = self.points.get(i + 1).unwrap_or(a);
+        let width = b.value - a.value;
+        let t = if width > 0.0 { ((value - a.value) / width).clamp(0.0, 1.0) } else { 0.0 };
+        (a, b, t)
+    }
+
+    /// All optics at a data value.
+    #[inline]
+    #[must_use]
+    pub fn optics(&self, value: f32) -> Optics {
+        let (a, b, t) = self.locate(value);
+        a.optics.lerp(&b.optics, t)
+    }
+
+    /// Opacity alone, for the many look-ups that need no more.
+    #[inline]
+    #[must_use]
+    pub fn opacity(&self, value: f32) -> f32 {
+        let (a, b, t) = self.locate(value);
+        a.optics.opacity + (b.optics.opacity - a.optics.opacity) * t
+    }
+
+    /// Smallest and largest of a quantity over data values `[lo, hi]`; exact, since a piecewise linear
+    /// quantity has its extremes at the ends or at points.
+    fn extremes(&self, [lo, hi]: [f32; 2], quantity: impl Fn(&Optics) -> f32) -> [f32; 2] {
+        let ends = [quantity(&self.optics(lo)), quantity(&self.optics(hi))];
+        let mut range = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        let first = self.points.partition_point(|p| p.value < lo);
+        for point in self.points[first..].iter().take_while(|p| p.value <= hi) {
+            let x = quantity(&point.optics);
+            range = [range[0].min(x), range[1].max(x)];
+        }
+        range
+    }
+
+    /// Smallest and largest opacity over data values `[lo, hi]`.
+    #[must_use]
+    pub fn opacity_range(&self, values: [f32; 2]) -> [f32; 2] {
+        self.extremes(values, |o| o.opacity)
+    }
+
+    /// An upper bound of the luminance that matter with values in `[lo, hi]` emits per unit length at
+    /// density 1, `opacity (1 - albedo) Le`: zero exactly where nothing can glow.
+    #[must_use]
+    pub fn emission_bound(&self, values: [f32; 2]) -> f32 {
+        let [_, opacity] = self.opacity_range(values);
+        let most = |f: fn(&Optics) -> f32| self.extremes(values, f)[1];
+        let channel = [
+            most(|o| 1.0 - o.albedo.r) * most(|o| o.emission.r),
+            most(|o| 1.0 - o.albedo.g) * most(|o| o.emission.g),
+            most(|o| 1.0 - o.albedo.b) * most(|o| o.emission.b),
+        ];
+        opacity * Rgb::from(channel).luminance()
+    }
+
+    /// Whether any matter glows.
+    #[must_use]
+    pub fn emits(&self) -> bool {
+        self.points.iter().any(|p| !p.optics.emission.is_black())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(value: f32, opacity: f32, red: f32) -> Point {
+        Point { value, optics: Optics { opacity, albedo: Rgb::new(red, 0.5, 0.5), ..Optics::default() } }
+    }
+
+    /// The plain definition: linear scan, no index.
+    fn by_definition(points: &[Point], v: f32) -> f32 {
+        match points.iter().rposition(|p| p.value <= v) {
+            None => points[0].optics.opacity,
+            Some(i) if i + 1 == points.len() => points[i].optics.opacity,
+            Some(i) => {
+                let (a, b) = (&points[i], &points[i + 1]);
+                let t = (v - a.value) / (b.value - a.value);
+                a.optics.opacity + (b.optics.opacity - a.optics.opacity) * t
+            }
+        }
+    }
+
+    #[test]
+    fn the_index_agrees_with_the_definition_everywhere() {
+        let mut points = vec![point(-1000.0, 0.0, 0.1), point(-999.5, 0.4, 0.1), point(-999.5, 0.9, 0.2)];
+        points.extend((0..40).map(|i| point(10.0 + 0.37 * i as f32, (i % 7) as f32 / 7.0, 0.3)));
+        points.extend([point(3000.0, 0.2, 0.5), point(3000.0, 1.0, 0.5)]);
+        let function = TransferFunction::new(points.clone()).unwrap();
+        let exactly_at_points = points.iter().map(|p| p.value);
+        let between = (0..20_000).map(|i| -1100.0 + i as f32 * 0.21);
+        for v in exactly_at_points.chain(between) {
+            let (found, expected) = (function.opacity(v), by_definition(&points, v));
+            assert!((found - expected).abs() < 1e-5, "{found}, expected {expected} at {v}");
+            assert_eq!(function.optics(v).opacity, found);
+        }
+    }
+
+    #[test]
+    fn a_jump_belongs_to_the_later_point_and_a_single_point_is_constant() {
+        let jump = TransferFunction::new(vec![
+            point(0.0, 0.0, 0.0),
+            point(1.0, 0.0, 0.0),
+            point(1.0, 1.0, 1.0),
+            point(2.0, 1.0, 1.0),
+        ])
+        .unwrap();
+        assert_eq!(jump.opacity(1.0), 1.0);
+        assert_eq!(jump.opacity(1.0_f32.next_down()), 0.0);
+        assert_eq!(jump.opacity_range([0.2, 0.9]), [0.0, 0.0]);
+        assert_eq!(jump.opacity_range([0.2, 1.0]), [0.0, 1.0]);
+        let one = TransferFunction::new(vec![point(5.0, 0.3, 0.0)]).unwrap();
+        assert_eq!((one.opacity(-1e30), one.opacity(5.0), one.opacity(f32::MAX)), (0.3, 0.3, 0.3));
+    }
+
+    #[test]
+    fn ranges_hold_every_value_inside() {
+        let points = [(0.0, 0.1), (2.0, 0.9), (3.0, 0.2), (7.0, 0.6)].map(|(v, o)| point(v, o, 0.2));
+        let function = TransferFunction::new(points.to_vec()).unwrap();
+        for i in 0..40 {
+            for j in i..40 {
+                let values = [i as f32 * 0.25 - 1.0, j as f32 * 0.25 - 1.0];
+                let [lo, hi] = function.opacity_range(values);
+                for k in 0..=20 {
+                    let v = values[0] + (values[1] - values[0]) * k as f32 / 20.0;
+                    let o = function.opacity(v);
+                    assert!(lo - 1e-6 <= o && o <= hi + 1e-6, "{o} outside [{lo}, {hi}] over {values:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn points_that_do_not_ascend_are_refused() {
+        let new =
+            |values: &[f32]| TransferFunction::new(values.iter().map(|&v| point(v, 0.5, 0.5)).collect());
+        assert_eq!(new(&[]), Err(TransferError::Empty));
+        assert_eq!(new(&[0.0, 2.0, 1.0]), Err(TransferError::Order { index: 2 }));
+        assert_eq!(new(&[1.0, 1.0, 1.0]), Err(TransferError::Order { index: 2 }));
+        assert_eq!(new(&[f32::NAN]), Err(TransferError::Order { index: 0 }));
+        assert!(new(&[1.0, 1.0, 2.0, 2.0]).is_ok());
+    }
+
+    #[test]
+    fn what_cannot_glow_has_no_emission_bound() {
+        let mut points = vec![point(0.0, 1.0, 1.0), point(1.0, 1.0, 0.0), point(2.0, 0.0, 0.0)];
+        points[1].optics.emission = Rgb::new(3.0, 0.0, 0.0);
+        let function = TransferFunction::new(points).unwrap();
+        assert!(function.emits());
+        assert_eq!(function.emission_bound([2.0, 5.0]), 0.0);
+        assert!(function.emission_bound([0.9, 1.1]) >= 0.2126 * 3.0 * 0.9);
+    }
+}
