@@ -7,3 +7,4 @@ pub mod math;
 pub mod sampling;
 pub mod transfer;
 pub mod volume;
+pub mod scattering;

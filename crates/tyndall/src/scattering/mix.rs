@@ -1,0 +1,319 @@
+//! The scattering function of a volume: a phase function where the data are even, more and more a
+//! BRDF where they have an edge.
+//!
+//! Per unit extinction `sigma_s s / sigma_t = (1-q) albedo phase + q f_r(w_in, w_out) |n . w_in|`.
+//! The cosine belongs to the side where the light comes from, whichever way the walk goes, so with
+//! `q > 0` the whole is not symmetric: a light walk weights by the same value with the same `w_in`.
+
+use super::{Brdf, Phase, Surface, Walk};
+use crate::math::{Rgb, Vec3};
+
+/// How far a point scatters as a surface: `surface (1 - exp(-gradient_factor |grad v| h / range))`.
+///
+/// `surface` in [0, 1] from the transfer function; `gradient_length` in data values per world unit;
+/// `voxel_size` the cube root of the voxel volume, in world units; `robust_range` in data values.
+/// 0 where the gradient vanishes and where the data have no range.
+#[inline]
+#[must_use]
+pub fn surface_share(
+    surface: f32,
+    gradient_factor: f32,
+    gradient_length: f32,
+    voxel_size: f32,
+    robust_range: f32,
+) -> f32 {
+    if !(gradient_length > 0.0 && robust_range > 0.0) {
+        return 0.0;
+    }
+    -surface * (-gradient_factor * gradient_length * voxel_size / robust_range).exp_m1()
+}
+
+/// All that decides how light scatters at one point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// Of the matter.
+    pub phase: Phase,
+    /// Of its surfaces.
+    pub brdf: Brdf,
+    /// Local optics; `albedo` serves both.
+    pub surface: Surface,
+    /// Unit gradient of the data, either way; `None` where it vanishes, which makes `q` count as 0.
+    pub normal: Option<Vec3>,
+    /// Share of the surface, in [0, 1]; see [`surface_share`].
+    pub q: f32,
+}
+
+/// A drawn direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Unit vector that leaves the point: `w_in` of a camera walk, `w_out` of a light walk. The walk's
+    /// next direction of travel.
+    pub direction: Vec3,
+    /// `eval / pdf`.
+    pub weight: Rgb,
+    /// Density over solid angle, \[1/sr\].
+    pub pdf: f32,
+}
+
+impl Event {
+    /// `sigma_s s / sigma_t`, \[1/sr\]: light from `w_in` that goes on to `w_out`, per unit extinction.
+    #[inline]
+    #[must_use]
+    pub fn eval(&self, w_out: Vec3, w_in: Vec3) -> Rgb {
+        let (normal, q) = self.side();
+        let matter = self.surface.albedo * ((1.0 - q) * self.phase.eval(-w_in.dot(w_out)));
+        if q == 0.0 {
+            return matter;
+        }
+        matter + self.brdf.eval(normal, w_in, w_out, &self.surface) * (q * normal.dot(w_in).abs())
+    }
+
+    /// In a camera walk: draws where the light comes from. `None` is light that was lost, a weight of 0.
+    ///
+    /// `u` are uniform numbers in [0, 1); the last one chooses the lobe.
+    #[inline]
+    #[must_use]
+    pub fn sample(&self, w_out: Vec3, u: [f32; 3]) -> Option<Sample> {
+        let (direction, pdf) = self.draw(Walk::Camera, w_out, u)?;
+        Some(Sample { direction, weight: self.eval(w_out, direction) / pdf, pdf })
+    }
+
+    /// Density with which [`Self::sample`] draws `w_in`, \[1/sr\]; falls short of 1 by the chance of `None`.
+    #[inline]
+    #[must_use]
+    pub fn pdf(&self, w_out: Vec3, w_in: Vec3) -> f32 {
+        self.density(Walk::Camera, w_out, w_in)
+    }
+
+    /// In a light walk: draws where the light goes. The weight keeps `|n . w_in|`, though `w_out` is drawn.
+    ///
+    /// `u` are uniform numbers in [0, 1); the last one chooses the lobe.
+    #[inline]
+    #[must_use]
+    pub fn sample_adjoint(&self, w_in: Vec3, u: [f32; 3]) -> Option<Sample> {
+        let (direction, pdf) = self.draw(Walk::Light, w_in, u)?;
+        Some(Sample { direction, weight: self.eval(direction, w_in) / pdf, pdf })
+    }
+
+    /// Density with which [`Self::sample_adjoint`] draws `w_out`, \[1/sr\].
+    #[inline]
+    #[must_use]
+    pub fn pdf_adjoint(&self, w_in: Vec3, w_out: Vec3) -> f32 {
+        self.density(Walk::Light, w_in, w_out)
+    }
+
+    fn draw(&self, walk: Walk, known: Vec3, u: [f32; 3]) -> Option<(Vec3, f32)> {
+        let (normal, _) = self.side();
+        let on_surface = self.surface_chance(walk, known);
+        let direction = if u[2] < on_surface {
+            self.brdf.sample(walk, normal, known, &self.surface, [u[0], u[1], u[2] / on_surface])?
+        } else {
+            // Phase functions are the same reversed, so both walks turn the way they travel, -known.
+            self.phase.sample(-known, [u[0], u[1]])
+        };
+        let pdf = self.density(walk, known, direction);
+        (pdf > 0.0).then_some((direction, pdf))
+    }
+
+    fn density(&self, walk: Walk, known: Vec3, drawn: Vec3) -> f32 {
+        let (normal, _) = self.side();
+        let on_surface = self.surface_chance(walk, known);
+        let matter = (1.0 - on_surface) * self.phase.eval(-known.dot(drawn));
+        if on_surface == 0.0 {
+            return matter;
+        }
+        matter + on_surface * self.brdf.pdf(walk, normal, known, drawn, &self.surface)
+    }
+
+    /// Chance of drawing by the BRDF: its share of what is scattered, so that weights stay bounded.
+    #[inline]
+    fn surface_chance(&self, walk: Walk, known: Vec3) -> f32 {
+        let (normal, q) = self.side();
+        if q == 0.0 {
+            return 0.0;
+        }
+        let reflected = self.brdf.reflectance_estimate(walk, normal.dot(known).abs(), &self.surface);
+        let (surface, matter) = (q * reflected, (1.0 - q) * self.surface.albedo.max_component());
+        if surface == 0.0 { 0.0 } else { surface / (surface + matter) }
+    }
+
+    /// The normal and the share of the surface; without a normal, none.
+    #[inline]
+    fn side(&self) -> (Vec3, f32) {
+        self.normal.map_or((Vec3::Z, 0.0), |normal| (normal, self.q))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::warp;
+    use crate::scattering::trial::{self, grey, mirrored, normal, tilted};
+    use crate::scattering::{Abc, HenyeyGreenstein, Schlick, deflect};
+    use tyndall_testing::{ChiSquare, Mean, SplitMix};
+
+    /// Mixes of every phase function and BRDF, q drawn at random; `normal` as given.
+    fn mixes(normal: Vec3) -> Vec<Event> {
+        let mut random = SplitMix::new(17);
+        let phases = [
+            Phase::Isotropic,
+            Phase::HenyeyGreenstein(HenyeyGreenstein::new(0.6).unwrap()),
+            Phase::Schlick(Schlick::new(-0.7).unwrap()),
+        ];
+        let brdfs = [
+            (Brdf::Lambert, 0.5),
+            (Brdf::AshikhminShirley, 0.25),
+            (Brdf::AshikhminShirley, 0.9),
+            (Brdf::Abc(Abc::new(800.0, 1.3).unwrap()), 0.5),
+        ];
+        let mut mixes = Vec::new();
+        for phase in phases {
+            for (brdf, roughness) in brdfs {
+                let [q] = random.uniforms();
+                let mut surface = grey(0.8, 0.3, roughness);
+                surface.albedo.b = 0.2;
+                surface.specular.r = 0.05;
+                mixes.push(Event { phase, brdf, surface, normal: Some(normal), q });
+            }
+        }
+        let only_surface = mixes.iter().take(4).map(|event| Event { q: 1.0, ..*event }).collect::<Vec<_>>();
+        mixes.extend(only_surface);
+        mixes
+    }
+
+    #[test]
+    fn share_of_the_surface() {
+        assert_eq!(surface_share(0.7, 10.0, 0.0, 1.0, 255.0), 0.0);
+        assert_eq!(surface_share(0.7, 10.0, 3.0, 1.0, 0.0), 0.0);
+        assert_eq!(surface_share(0.0, 10.0, 3.0, 1.0, 255.0), 0.0);
+        let q = surface_share(0.7, 10.0, 20.0, 0.5, 400.0);
+        assert!((q - 0.7 * (1.0 - (-0.25_f32).exp())).abs() < 1e-6, "{q}");
+        assert_eq!(surface_share(1.0, 10.0, 1e6, 1.0, 1.0), 1.0);
+    }
+
+    #[test]
+    fn a_lambert_surface_by_hand() {
+        let event = Event {
+            phase: Phase::Isotropic,
+            brdf: Brdf::Lambert,
+            surface: grey(0.5, 0.0, 0.5),
+            normal: Some(-Vec3::Z),
+            q: 0.25,
+        };
+        let (w_in, w_out) = (Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.0, 0.96, 0.28));
+        let matter = 0.75 * 0.5 / (4.0 * std::f32::consts::PI);
+        let expected = matter + 0.25 * 0.5 / std::f32::consts::PI * 0.8;
+        assert!((event.eval(w_out, w_in).r - expected).abs() < 1e-7);
+        assert!((event.eval(w_out, -w_in).r - matter).abs() < 1e-8, "light from behind");
+        let no_normal = Event { normal: None, ..event };
+        assert!(
+            (no_normal.eval(w_out, w_in).r - matter / 0.75).abs() < 1e-8,
+            "without a normal q counts as 0"
+        );
+    }
+
+    #[test]
+    fn reversing_the_light_exchanges_the_cosine() {
+        let mut random = SplitMix::new(2);
+        for event in mixes(normal()) {
+            for _ in 0..500 {
+                let [a, b] = std::array::from_fn(|_| warp::sphere(random.uniforms()));
+                let matter = Event { q: 0.0, ..event };
+                assert_eq!(matter.eval(a, b), matter.eval(b, a));
+                let surface = Event { q: 1.0, ..event };
+                let there = surface.eval(a, b).g * normal().dot(a).abs();
+                let back = surface.eval(b, a).g * normal().dot(b).abs();
+                assert!((there - back).abs() <= 1e-5 * there.max(back), "{event:?}: {there}, {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn samplers_follow_their_densities() {
+        for degrees in [0.0, 50.0, 86.0] {
+            let n = deflect(Vec3::Z, 1.0 - f32::to_radians(degrees).cos(), 0.1);
+            let known = n * (2.0 * n.z) - Vec3::Z;
+            let mixes = mixes(n);
+            let test = ChiSquare { samples: 200_000, ..ChiSquare::of(6 * mixes.len()) };
+            for event in mixes {
+                let camera = test.directions(
+                    |u| event.sample(known, u).map(|s| s.direction.to_array()),
+                    |w| f64::from(event.pdf(known, Vec3::from_array(w))),
+                );
+                assert!(camera.passes(), "camera walk, {event:?}, {degrees} degrees: {camera}");
+                let light = test.directions(
+                    |u| event.sample_adjoint(known, u).map(|s| s.direction.to_array()),
+                    |w| f64::from(event.pdf_adjoint(known, Vec3::from_array(w))),
+                );
+                assert!(light.passes(), "light walk, {event:?}, {degrees} degrees: {light}");
+            }
+        }
+    }
+
+    /// The mean weight is the integral of `eval` over the drawn direction, the cosine of `w_in` in both walks.
+    #[test]
+    fn weights_average_to_the_integral() {
+        let mut random = SplitMix::new(3);
+        let angles = [10.0, 60.0, 85.0];
+        let events = mixes(normal());
+        let tests = 2 * 3 * angles.len() * events.len();
+        for event in events {
+            for degrees in angles {
+                let known = tilted(degrees);
+                let integrals = trial::integrate(mirrored(known), |w| {
+                    let (camera, light) = (event.eval(known, w).to_array(), event.eval(w, known).to_array());
+                    [camera[0], camera[1], camera[2], light[0], light[1], light[2]].map(f64::from)
+                });
+                let mut means = [Mean::default(); 6];
+                for _ in 0..100_000 {
+                    let weight = |s: Option<Sample>| s.map_or([0.0; 3], |s| s.weight.to_array());
+                    let camera = weight(event.sample(known, random.uniforms()));
+                    let light = weight(event.sample_adjoint(known, random.uniforms()));
+                    for (mean, w) in means.iter_mut().zip(camera.into_iter().chain(light)) {
+                        mean.push(f64::from(w));
+                    }
+                }
+                for (i, (mean, integral)) in means.iter().zip(integrals).enumerate() {
+                    let test = mean.against(integral).of(tests);
+                    assert!(test.passes(), "channel {i}, {event:?}, {degrees} degrees: {test}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn weights_stay_bounded_at_every_angle() {
+        let mut random = SplitMix::new(4);
+        let mut largest = 0.0_f32;
+        for event in mixes(normal()) {
+            for _ in 0..200_000 {
+                let known = warp::sphere(random.uniforms());
+                for sample in
+                    [event.sample(known, random.uniforms()), event.sample_adjoint(known, random.uniforms())]
+                        .into_iter()
+                        .flatten()
+                {
+                    assert!(sample.weight.is_finite() && sample.pdf > 0.0, "{event:?} {known}: {sample:?}");
+                    assert!((sample.direction.length() - 1.0).abs() < 1e-5, "{sample:?}");
+                    largest = largest.max(sample.weight.max_component());
+                }
+            }
+        }
+        assert!(largest < 4.0, "largest weight {largest}");
+    }
+
+    #[test]
+    fn black_matter_ends_the_walk() {
+        let event = Event {
+            phase: Phase::Isotropic,
+            brdf: Brdf::Lambert,
+            surface: grey(0.0, 0.0, 0.5),
+            normal: Some(Vec3::Z),
+            q: 1.0,
+        };
+        assert_eq!(event.sample(Vec3::Z, [0.5; 3]), None);
+        assert_eq!(event.pdf(Vec3::Z, Vec3::Z), 0.0);
+        let surface = grey(0.9, 0.0, 0.5);
+        assert_eq!(Event { surface, ..event }.sample(Vec3::X, [0.5; 3]), None, "along the surface");
+    }
+}

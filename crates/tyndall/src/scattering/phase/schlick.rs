@@ -1,0 +1,58 @@
+//! Schlick's rational phase function [Blasi93].
+
+use super::PhaseError;
+use crate::math::{Vec3, cast};
+use crate::scattering::deflect;
+use std::f32::consts::PI;
+
+/// A lobe without a root, close to Henyey-Greenstein's [Blasi93]:
+/// `(1 - k^2) / (4 pi (1 - k cos_theta)^2)`; k > 0 is forward.
+///
+/// Texts that write `1 + k cos_theta` take both directions as leaving the point; here they follow the light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Schlick {
+    k: f32,
+}
+
+impl Schlick {
+    /// From its elongation.
+    ///
+    /// # Errors
+    /// [`PhaseError::Elongation`] unless `-1 < k < 1`; at +-1 the lobe is no longer a function.
+    pub fn new(k: f32) -> Result<Self, PhaseError> {
+        if -1.0 < k && k < 1.0 { Ok(Self { k }) } else { Err(PhaseError::Elongation(k)) }
+    }
+
+    /// Density of turning by `cos_theta`, \[1/sr\]; also the exact pdf of [`Self::sample`].
+    #[inline]
+    #[must_use]
+    pub fn eval(self, cos_theta: f32) -> f32 {
+        let k = self.k.abs();
+        let drop = (1.0 - cos_theta * 1.0_f32.copysign(self.k)).max(0.0);
+        let gap = 1.0 - k;
+        let d = gap + k * drop;
+        gap * (1.0 + k) / (4.0 * PI * d * d)
+    }
+
+    /// Draws the direction after scattering from two uniform numbers in [0, 1).
+    #[inline]
+    #[must_use]
+    pub fn sample(self, w: Vec3, u: [f32; 2]) -> Vec3 {
+        let k = self.k.abs();
+        let gap = 1.0 - k;
+        let drop = 2.0 * gap * u[0] / (gap + 2.0 * k * (1.0 - u[0]));
+        deflect(w * 1.0_f32.copysign(self.k), drop, u[1])
+    }
+
+    /// Mean of `cos_theta`: `1/k - (1 - k^2) artanh(k) / k^2`.
+    #[must_use]
+    pub fn mean_cosine(self) -> f32 {
+        let k = f64::from(self.k);
+        // The two terms cancel for small k; their series does not.
+        cast::single(if k.abs() < 1e-2 {
+            k * (2.0 / 3.0 + k * k * (2.0 / 15.0 + k * k * 2.0 / 35.0))
+        } else {
+            1.0 / k - (1.0 - k * k) * k.atanh() / (k * k)
+        })
+    }
+}
