@@ -43,7 +43,7 @@ fn nothing_reflects_more_than_it_gets() {
                 let total = reflected(&brdf, tilted(degrees), &grey(1.0, specular, roughness));
                 most = most.max(total);
                 assert!(
-                    total < 1.0 + 2e-3,
+                    total < 1.0 + 2e-4,
                     "{brdf:?}, roughness {roughness}, specular {specular}, {degrees} degrees: {total}"
                 );
             }
@@ -107,7 +107,7 @@ fn nothing_passes_through_or_along_a_surface() {
 fn trials() -> Vec<(Brdf, Surface, f32)> {
     let mut trials =
         vec![(Brdf::Lambert, grey(0.6, 0.0, 0.5), 30.0), (Brdf::Lambert, grey(0.6, 0.0, 0.5), 87.0)];
-    for degrees in [0.0, 45.0, 80.0, 87.0] {
+    for degrees in [0.0, 60.0, 86.0] {
         for roughness in [0.15, 0.4, 1.0] {
             trials.push((Brdf::AshikhminShirley, grey(0.5, 0.3, roughness), degrees));
         }
@@ -128,7 +128,8 @@ fn samplers_follow_their_densities() {
             // The mirror direction is the pole of the cells, which finds lobes however narrow.
             let n = deflect(Vec3::Z, 1.0 - degrees.to_radians().cos(), 0.1);
             let known = n * (2.0 * n.z) - Vec3::Z;
-            let test = ChiSquare { samples: 200_000, ..ChiSquare::of(2 * trials.len()) };
+            let test =
+                ChiSquare { samples: 200_000, rows: 256, columns: 16, ..ChiSquare::of(2 * trials.len()) };
             let fit = test.directions(
                 |u| brdf.sample(walk, n, known, surface, u).map(|w| w.to_array()),
                 |w| f64::from(brdf.pdf(walk, n, known, Vec3::from_array(w), surface)),

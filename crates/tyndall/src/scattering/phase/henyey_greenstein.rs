@@ -25,12 +25,29 @@ impl HenyeyGreenstein {
     #[inline]
     #[must_use]
     pub fn eval(self, cos_theta: f32) -> f32 {
+        self.at_drop(1.0 - cos_theta * self.side())
+    }
+
+    /// [`Self::eval`] of two unit vectors, `w` before and `after` scattering, without the rounding of a cosine.
+    #[inline]
+    #[must_use]
+    pub fn eval_between(self, w: Vec3, after: Vec3) -> f32 {
+        self.at_drop(0.5 * (w * self.side() - after).length_squared())
+    }
+
+    /// Density at `1 - cos` from the lobe's axis. There `1 + g^2 - 2 g cos` is a sum of positive terms.
+    #[inline]
+    fn at_drop(self, drop: f32) -> f32 {
         let g = self.g.abs();
-        // 1 + g^2 - 2 g cos as a sum of positive terms, so that nothing cancels in a narrow lobe.
-        let drop = (1.0 - cos_theta * 1.0_f32.copysign(self.g)).max(0.0);
         let gap = 1.0 - g;
-        let d = gap * gap + 2.0 * g * drop;
+        let d = gap * gap + 2.0 * g * drop.max(0.0);
         gap * (1.0 + g) / (4.0 * PI * d * d.sqrt())
+    }
+
+    /// +1 if the lobe lies ahead, -1 if behind.
+    #[inline]
+    fn side(self) -> f32 {
+        1.0_f32.copysign(self.g)
     }
 
     /// Draws the direction after scattering from two uniform numbers in [0, 1).
@@ -45,7 +62,7 @@ impl HenyeyGreenstein {
         let (gap, rest) = (1.0 - g, 1.0 - u[0]);
         let shrink = gap / (gap + 2.0 * g * rest);
         let drop = 2.0 * shrink * shrink * u[0] * (1.0 + g * rest);
-        deflect(w * 1.0_f32.copysign(self.g), drop, u[1])
+        deflect(w * self.side(), drop, u[1])
     }
 
     /// Mean of `cos_theta`: `g`.

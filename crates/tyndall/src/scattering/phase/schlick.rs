@@ -27,11 +27,29 @@ impl Schlick {
     #[inline]
     #[must_use]
     pub fn eval(self, cos_theta: f32) -> f32 {
+        self.at_drop(1.0 - cos_theta * self.side())
+    }
+
+    /// [`Self::eval`] of two unit vectors, `w` before and `after` scattering, without the rounding of a cosine.
+    #[inline]
+    #[must_use]
+    pub fn eval_between(self, w: Vec3, after: Vec3) -> f32 {
+        self.at_drop(0.5 * (w * self.side() - after).length_squared())
+    }
+
+    /// Density at `1 - cos` from the lobe's axis. There `1 - k cos` is a sum of positive terms.
+    #[inline]
+    fn at_drop(self, drop: f32) -> f32 {
         let k = self.k.abs();
-        let drop = (1.0 - cos_theta * 1.0_f32.copysign(self.k)).max(0.0);
         let gap = 1.0 - k;
-        let d = gap + k * drop;
+        let d = gap + k * drop.max(0.0);
         gap * (1.0 + k) / (4.0 * PI * d * d)
+    }
+
+    /// +1 if the lobe lies ahead, -1 if behind.
+    #[inline]
+    fn side(self) -> f32 {
+        1.0_f32.copysign(self.k)
     }
 
     /// Draws the direction after scattering from two uniform numbers in [0, 1).
@@ -41,7 +59,7 @@ impl Schlick {
         let k = self.k.abs();
         let gap = 1.0 - k;
         let drop = 2.0 * gap * u[0] / (gap + 2.0 * k * (1.0 - u[0]));
-        deflect(w * 1.0_f32.copysign(self.k), drop, u[1])
+        deflect(w * self.side(), drop, u[1])
     }
 
     /// Mean of `cos_theta`: `1/k - (1 - k^2) artanh(k) / k^2`.
