@@ -3,8 +3,15 @@
 //! This crate is the renderer: it knows no file, window, server, Python or GPU. Modules follow the
 //! concepts of the field, and imports run one way, from [`math`] up to the session.
 
+pub mod camera;
+pub mod film;
+pub mod integrator;
+pub mod light;
 pub mod math;
+pub mod medium;
 pub mod sampling;
+pub mod scattering;
+pub mod scene;
+pub mod session;
 pub mod transfer;
 pub mod volume;
-pub mod scattering;

@@ -1,5 +1,6 @@
 //! The numbers of one camera path: low discrepancy for its first bounces, a random stream after.
 
+use super::stream::exponential;
 use super::{Stream, philox};
 use sobol_burley::sample_4d;
 
@@ -12,7 +13,7 @@ const SEQUENCE: u32 = 1 << 16;
 /// The numbers of one scattering event, each in [0, 1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BounceSample {
-    /// Optical depth of the flight that leads here.
+    /// How far the flight that leads here goes; see [`Self::flight_depth`].
     pub flight: f32,
     /// Which light.
     pub light_choice: f32,
@@ -22,6 +23,15 @@ pub struct BounceSample {
     pub scatter: [f32; 3],
     /// Whether the path goes on.
     pub roulette: f32,
+}
+
+impl BounceSample {
+    /// Optical depth to the flight's first tentative collision, exponentially distributed.
+    #[inline]
+    #[must_use]
+    pub fn flight_depth(&self) -> f32 {
+        exponential(self.flight)
+    }
 }
 
 /// Owen-scrambled Sobol points [Burley20] per pixel, and a [`Stream`] for what has no fixed number of draws.

@@ -48,6 +48,15 @@ impl Bricks {
         &self.ranges
     }
 
+    /// The number of the cell at an index-space place, clamped to the grid.
+    #[must_use]
+    pub fn cell_at(&self, p: Vec3) -> usize {
+        let place = (p + 0.5) / self.cell as f32;
+        let [nx, ny, nz] = self.dims;
+        let pick = |x: f32, n: usize| cast::index(x).min(n - 1);
+        pick(place.x, nx) + nx * (pick(place.y, ny) + ny * pick(place.z, nz))
+    }
+
     /// The part of index space that a cell covers, cut to the medium's box.
     #[must_use]
     pub fn cell_bounds(&self, cell: usize, medium: &Bounds) -> Bounds {

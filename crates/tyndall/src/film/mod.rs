@@ -1,0 +1,273 @@
+//! The film: mean and variance of every pixel.
+//!
+//! It is cut into tiles that each thread has for itself, so that pixels next to each other never
+//! share a cache line across threads and each tile may be a sample ahead of another.
+
+use crate::math::{Rgb, cast};
+
+/// What one sample of a pixel found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PixelSample {
+    /// Radiance; premultiplied where the background is transparent.
+    pub radiance: Rgb,
+    /// 1 - transmittance to the background, or an unbiased estimate of it.
+    pub alpha: f32,
+    /// Distance along the view of the matter seen, times `alpha`.
+    pub depth: f32,
+}
+
+/// Edge of a tile in pixels.
+pub const TILE: u32 = 16;
+
+/// Mean and scatter of the samples of one pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Pixel {
+    mean: [f32; 3],
+    /// Sum of squared deviations from the mean.
+    scatter: [f32; 3],
+    /// The same of the luminance, which the channels' own do not tell.
+    luminance_scatter: f32,
+    alpha: f32,
+    depth: f32,
+}
+
+impl Pixel {
+    /// Welford's update with the `n`-th sample, in double precision.
+    fn add(&mut self, sample: &PixelSample, n: f64) {
+        let radiance = sample.radiance.to_array();
+        let luminance = f64::from(sample.radiance.luminance());
+        let before = luminance - luminance_of(self.mean.map(f64::from));
+        for (x, (mean, scatter)) in radiance.into_iter().zip(self.mean.iter_mut().zip(&mut self.scatter)) {
+            let x = f64::from(x);
+            let (old, sum) = (f64::from(*mean), f64::from(*scatter));
+            let moved = old + (x - old) / n;
+            *mean = cast::single(moved);
+            *scatter = cast::single(sum + (x - old) * (x - moved));
+        }
+        let after = luminance - luminance_of(self.mean.map(f64::from));
+        self.luminance_scatter = cast::single(f64::from(self.luminance_scatter) + before * after);
+        let blend = |old: f32, new: f32| cast::single(f64::from(old) + (f64::from(new) - f64::from(old)) / n);
+        self.alpha = blend(self.alpha, sample.alpha);
+        self.depth = blend(self.depth, sample.depth);
+    }
+}
+
+fn luminance_of([r, g, b]: [f64; 3]) -> f64 {
+    0.2126 * r + 0.7152 * g + 0.0722 * b
+}
+
+/// A square of pixels and how many samples each of them has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tile {
+    origin: [u32; 2],
+    size: [u32; 2],
+    samples: u32,
+    pixels: Vec<Pixel>,
+}
+
+impl Tile {
+    /// Samples that every pixel of the tile has.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    /// Adds one sample to every pixel; `sample` is given the pixel and the number of the sample.
+    pub fn add_pass(&mut self, mut sample: impl FnMut([u32; 2], u32) -> PixelSample) {
+        let n = f64::from(self.samples) + 1.0;
+        let [width, _] = self.size;
+        for (i, pixel) in (0_u32..).zip(&mut self.pixels) {
+            let place = [self.origin[0] + i % width, self.origin[1] + i / width];
+            pixel.add(&sample(place, self.samples), n);
+        }
+        self.samples += 1;
+    }
+}
+
+/// A picture in the making.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    size: [u32; 2],
+    tiles: Vec<Tile>,
+}
+
+/// A finished or intermediate picture, row 0 on top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Width and height.
+    pub size: [u32; 2],
+    /// Linear radiance and alpha, premultiplied.
+    pub rgba: Vec<[f32; 4]>,
+    /// Variance of each pixel's mean; infinite with one sample.
+    pub variance: Vec<[f32; 3]>,
+    /// Mean distance along the view of the matter seen, world units; infinite where none is.
+    pub depth: Vec<f32>,
+}
+
+impl Film {
+    /// Black, without samples. Both sides at least 1.
+    #[must_use]
+    pub fn new(size: [u32; 2]) -> Self {
+        let [columns, rows] = size.map(|n| n.div_ceil(TILE));
+        let tile = |i: u32| {
+            let origin = [i % columns * TILE, i / columns * TILE];
+            let size = [0, 1].map(|a| TILE.min(size[a] - origin[a]));
+            let pixels = vec![Pixel::default(); (size[0] * size[1]) as usize];
+            Tile { origin, size, samples: 0, pixels }
+        };
+        Self { size, tiles: (0..columns * rows).map(tile).collect() }
+    }
+
+    /// Bytes that a film of a size keeps.
+    #[must_use]
+    pub fn bytes(size: [u32; 2]) -> u64 {
+        u64::from(size[0]) * u64::from(size[1]) * size_of::<Pixel>() as u64
+    }
+
+    /// Width and height.
+    #[must_use]
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// The tiles, to be worked on apart.
+    pub fn tiles_mut(&mut self) -> &mut [Tile] {
+        &mut self.tiles
+    }
+
+    /// Samples that every pixel has at least.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.tiles.iter().map(|t| t.samples).min().unwrap_or(0)
+    }
+
+    /// Samples per pixel, averaged over the picture.
+    #[must_use]
+    pub fn mean_samples(&self) -> f64 {
+        let taken: f64 = self.tiles.iter().map(|t| f64::from(t.samples) * t.pixels.len() as f64).sum();
+        taken / (f64::from(self.size[0]) * f64::from(self.size[1]))
+    }
+
+    fn pixels(&self) -> impl Iterator<Item = ([u32; 2], f64, &Pixel)> {
+        self.tiles.iter().flat_map(|tile| {
+            (0_u32..).zip(&tile.pixels).map(move |(i, pixel)| {
+                let [x, y] = tile.origin;
+                ([x + i % tile.size[0], y + i / tile.size[0]], f64::from(tile.samples), pixel)
+            })
+        })
+    }
+
+    /// The picture so far.
+    #[must_use]
+    pub fn image(&self) -> Image {
+        let pixels = self.size[0] as usize * self.size[1] as usize;
+        let mut image = Image {
+            size: self.size,
+            rgba: vec![[0.0; 4]; pixels],
+            variance: vec![[f32::INFINITY; 3]; pixels],
+            depth: vec![f32::INFINITY; pixels],
+        };
+        for ([x, y], n, pixel) in self.pixels() {
+            let i = y as usize * self.size[0] as usize + x as usize;
+            let [r, g, b] = pixel.mean;
+            image.rgba[i] = [r, g, b, pixel.alpha];
+            if n > 1.0 {
+                let of_mean = |s: f32| cast::single(f64::from(s) / (n * (n - 1.0)));
+                image.variance[i] = pixel.scatter.map(of_mean);
+            }
+            if pixel.alpha > 0.0 {
+                image.depth[i] = pixel.depth / pixel.alpha;
+            }
+        }
+        image
+    }
+
+    /// Mean radiance over the picture.
+    #[must_use]
+    pub fn mean_radiance(&self) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for (_, _, pixel) in self.pixels() {
+            for (sum, &x) in sum.iter_mut().zip(&pixel.mean) {
+                *sum += f64::from(x);
+            }
+        }
+        sum.map(|s| s / (f64::from(self.size[0]) * f64::from(self.size[1])))
+    }
+
+    /// Noise of the picture: `sqrt(mean of var / (mean^2 + 0.01 M^2))` in luminance over the pixels,
+    /// `M` the picture's mean. `None` before every pixel has two samples, or if all is black.
+    #[must_use]
+    pub fn relative_error(&self) -> Option<f64> {
+        if self.samples() < 2 {
+            return None;
+        }
+        let whole = luminance_of(self.mean_radiance());
+        let mut sum = 0.0;
+        let mut count = 0.0;
+        for (_, n, pixel) in self.pixels() {
+            let variance = f64::from(pixel.luminance_scatter.max(0.0)) / (n * (n - 1.0));
+            let mean = luminance_of(pixel.mean.map(f64::from));
+            sum += variance / (mean * mean + 0.01 * whole * whole).max(f64::MIN_POSITIVE);
+            count += 1.0;
+        }
+        (whole > 0.0).then(|| (sum / count).sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mean_variance_and_depth_are_those_of_the_samples() {
+        let mut film = Film::new([37, 19]);
+        let samples = [0.5_f32, 1.5, 4.0];
+        for tile in film.tiles_mut() {
+            for _ in 0..3 {
+                tile.add_pass(|[x, y], n| {
+                    let hit = n > 0;
+                    PixelSample {
+                        radiance: Rgb::new(samples[n as usize], x as f32, y as f32),
+                        alpha: f32::from(hit),
+                        depth: if hit { 7.0 + n as f32 } else { 0.0 },
+                    }
+                });
+            }
+        }
+        let image = film.image();
+        let i = 17 * 37 + 33;
+        assert_eq!(image.rgba[i], [2.0, 33.0, 17.0, 2.0 / 3.0]);
+        // Deviations -1.5, -0.5, 2: squares 6.5, over n (n - 1) = 6.
+        assert!((image.variance[i][0] - 6.5 / 6.0).abs() < 1e-6 && image.variance[i][1] == 0.0);
+        assert!((image.depth[i] - 8.5).abs() < 1e-6);
+        assert_eq!(film.samples(), 3);
+        assert!((film.mean_radiance()[1] - 18.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_tile_ahead_of_the_others_counts_for_itself() {
+        let mut film = Film::new([32, 16]);
+        let grey = |_: [u32; 2], _: u32| PixelSample { radiance: Rgb::WHITE, ..PixelSample::default() };
+        film.tiles_mut()[1].add_pass(grey);
+        assert_eq!((film.samples(), film.mean_samples()), (0, 0.5));
+        assert_eq!(film.relative_error(), None);
+        for _ in 0..2 {
+            film.tiles_mut().iter_mut().for_each(|t| t.add_pass(grey));
+        }
+        assert_eq!(film.relative_error(), Some(0.0));
+    }
+
+    #[test]
+    fn the_error_is_that_of_the_mean() {
+        // Samples 0 and 2 by turns: variance 1, mean 1, n = 400.
+        let mut film = Film::new([16, 16]);
+        for _ in 0..400 {
+            film.tiles_mut()[0].add_pass(|_, n| PixelSample {
+                radiance: Rgb::splat((n % 2) as f32 * 2.0),
+                ..PixelSample::default()
+            });
+        }
+        let expected = (1.0 / 399.0 / 1.01_f64).sqrt();
+        assert!((film.relative_error().unwrap() / expected - 1.0).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,178 @@
+//! Shining rectangles, disks and spheres.
+
+use super::{LightSample, Passed, Target, strength_of_area};
+use crate::math::{Frame, Ray, Rgb, Vec3};
+use crate::sampling::warp;
+use std::f32::consts::PI;
+
+/// A point of a flat light as seen from elsewhere, in solid angle.
+fn flat_sample(from: Vec3, point: Vec3, normal: Vec3, area: f32, radiance: Rgb) -> Option<LightSample> {
+    let to_light = point - from;
+    let squared = to_light.length_squared();
+    let distance = squared.sqrt();
+    let direction = to_light / distance;
+    let cos = -direction.dot(normal);
+    // Behind the light, in its plane, or on it: nothing arrives. False for NaN too.
+    if cos > 0.0 && squared > 0.0 {
+        let pdf = squared / (cos * area);
+        return Some(LightSample { direction, distance, radiance: radiance / pdf, pdf });
+    }
+    None
+}
+
+/// Distance, cosine and the point relative to the middle where a ray passes the shining side of a plane.
+fn flat_passed(ray: &Ray, middle: Vec3, normal: Vec3) -> Option<(f32, f32, Vec3)> {
+    let cos = -ray.direction.dot(normal);
+    if cos <= 0.0 {
+        return None;
+    }
+    let distance = (ray.origin - middle).dot(normal) / cos;
+    (distance > 0.0).then(|| (distance, cos, ray.at(distance) - middle))
+}
+
+/// A rectangle that shines from the side of its target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rect {
+    middle: Vec3,
+    /// `u` along the width, `v` along the height, `w` to the shining side.
+    frame: Frame,
+    size: [f32; 2],
+    radiance: Rgb,
+}
+
+impl Rect {
+    /// `facing` and `up` are directions of any length; an `up` along `facing` is replaced by any other.
+    #[must_use]
+    pub fn new(middle: Vec3, facing: Vec3, up: Vec3, size: [f32; 2], radiance: Rgb) -> Self {
+        let w = facing.normalize();
+        let across = up.cross(w);
+        let frame = if across.length() > 1e-6 * up.length() {
+            let u = across.normalize();
+            Frame { u, v: w.cross(u), w }
+        } else {
+            Frame::around(w)
+        };
+        Self { middle, frame, size, radiance }
+    }
+
+    fn area(&self) -> f32 {
+        self.size[0] * self.size[1]
+    }
+
+    #[inline]
+    pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let point = self.middle
+            + self.frame.u * ((u[0] - 0.5) * self.size[0])
+            + self.frame.v * ((u[1] - 0.5) * self.size[1]);
+        flat_sample(from, point, self.frame.w, self.area(), self.radiance)
+    }
+
+    #[inline]
+    pub(super) fn passed(&self, ray: &Ray) -> Option<Passed> {
+        let (distance, cos, offset) = flat_passed(ray, self.middle, self.frame.w)?;
+        let inside = offset.dot(self.frame.u).abs() <= 0.5 * self.size[0]
+            && offset.dot(self.frame.v).abs() <= 0.5 * self.size[1];
+        let pdf = distance * distance / (cos * self.area());
+        inside.then_some(Passed { distance, radiance: self.radiance, pdf })
+    }
+
+    pub(super) fn strength(&self, target: &Target) -> f64 {
+        strength_of_area(self.radiance, self.area(), self.middle, target)
+    }
+}
+
+/// A disk that shines from the side of its target.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disk {
+    middle: Vec3,
+    frame: Frame,
+    radius: f32,
+    radiance: Rgb,
+}
+
+impl Disk {
+    /// `facing` is a direction of any length but zero.
+    #[must_use]
+    pub fn new(middle: Vec3, facing: Vec3, radius: f32, radiance: Rgb) -> Self {
+        Self { middle, frame: Frame::around(facing.normalize()), radius, radiance }
+    }
+
+    fn area(&self) -> f32 {
+        PI * self.radius * self.radius
+    }
+
+    #[inline]
+    pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let [x, y] = warp::disk(u).map(|c| c * self.radius);
+        let point = self.middle + self.frame.u * x + self.frame.v * y;
+        flat_sample(from, point, self.frame.w, self.area(), self.radiance)
+    }
+
+    #[inline]
+    pub(super) fn passed(&self, ray: &Ray) -> Option<Passed> {
+        let (distance, cos, offset) = flat_passed(ray, self.middle, self.frame.w)?;
+        let pdf = distance * distance / (cos * self.area());
+        (offset.length() <= self.radius).then_some(Passed { distance, radiance: self.radiance, pdf })
+    }
+
+    pub(super) fn strength(&self, target: &Target) -> f64 {
+        strength_of_area(self.radiance, self.area(), self.middle, target)
+    }
+}
+
+/// A sphere that shines outwards; inside it there is no light of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SphereLight {
+    /// Middle, world.
+    pub middle: Vec3,
+    /// Radius, world units; positive.
+    pub radius: f32,
+    /// Radiance of its surface.
+    pub radiance: Rgb,
+}
+
+impl SphereLight {
+    /// `1 - cos` of the half angle under which the sphere is seen; `None` from inside.
+    fn cap(&self, from: Vec3) -> Option<f32> {
+        let sin_squared = self.radius * self.radius / (self.middle - from).length_squared();
+        (sin_squared < 1.0).then(|| sin_squared / (1.0 + (1.0 - sin_squared).sqrt()))
+    }
+
+    #[inline]
+    pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let cap = self.cap(from)?;
+        let to_middle = self.middle - from;
+        let drop = u[0] * cap;
+        let sin = (drop * (2.0 - drop)).sqrt();
+        let turned = (warp::around_z(0.0, u[1]) * sin).with_z(1.0 - drop);
+        let direction = Frame::around(to_middle.normalize()).to_world(turned).normalize();
+        let distance = self.nearest(&Ray::new(from, direction))?;
+        let pdf = 1.0 / (2.0 * PI * cap);
+        Some(LightSample { direction, distance, radiance: self.radiance / pdf, pdf })
+    }
+
+    /// Distance to the near side; a ray that rounding makes miss the edge touches it.
+    fn nearest(&self, ray: &Ray) -> Option<f32> {
+        let to_middle = self.middle - ray.origin;
+        let along = to_middle.dot(ray.direction);
+        let aside = (to_middle - ray.direction * along).length_squared();
+        let half_chord = (self.radius * self.radius - aside).max(0.0).sqrt();
+        (along - half_chord > 0.0).then_some(along - half_chord)
+    }
+
+    #[inline]
+    pub(super) fn passed(&self, ray: &Ray) -> Option<Passed> {
+        let cap = self.cap(ray.origin)?;
+        let to_middle = (self.middle - ray.origin).normalize();
+        let drop = 0.5 * (ray.direction - to_middle).length_squared();
+        if drop > cap {
+            return None;
+        }
+        let distance = self.nearest(ray)?;
+        Some(Passed { distance, radiance: self.radiance, pdf: 1.0 / (2.0 * PI * cap) })
+    }
+
+    pub(super) fn strength(&self, target: &Target) -> f64 {
+        strength_of_area(self.radiance, PI * self.radius * self.radius, self.middle, target)
+    }
+}

@@ -1,0 +1,67 @@
+//! Light from one direction, or from a cone around it.
+
+use super::{LightSample, Passed};
+use crate::math::{Frame, Ray, Rgb, Vec3};
+use crate::sampling::warp;
+use std::f32::consts::PI;
+
+/// The sun: the same everywhere. With an angle it is a uniform disk in the sky.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Directional {
+    /// Frame about the direction *to* the light.
+    frame: Frame,
+    irradiance: Rgb,
+    /// `1 - cos` of half the cone's angle; 0 is sharp.
+    cap: f32,
+}
+
+impl Directional {
+    /// `travel` is where the light goes (any length but zero), `irradiance` what a surface facing it
+    /// receives, `angle` the full cone in degrees, 0 (sharp) to 180.
+    #[must_use]
+    pub fn new(travel: Vec3, irradiance: Rgb, angle: f32) -> Self {
+        let half = 0.5 * angle.to_radians();
+        // 1 - cos without cancellation.
+        let cap = 2.0 * (0.5 * half).sin().powi(2);
+        Self { frame: Frame::around(-travel.normalize()), irradiance, cap }
+    }
+
+    pub(super) fn is_sharp(&self) -> bool {
+        self.cap == 0.0
+    }
+
+    /// Radiance inside the cone: `E = L pi sin^2(half)`.
+    fn radiance(&self) -> Rgb {
+        self.irradiance / (PI * self.cap * (2.0 - self.cap))
+    }
+
+    fn pdf(&self) -> f32 {
+        1.0 / (2.0 * PI * self.cap)
+    }
+
+    #[inline]
+    pub(super) fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
+        let distance = f32::INFINITY;
+        if self.is_sharp() {
+            let direction = self.frame.w;
+            return Some(LightSample { direction, distance, radiance: self.irradiance, pdf: distance });
+        }
+        let drop = u[0] * self.cap;
+        let sin = (drop * (2.0 - drop)).sqrt();
+        let turn = warp::around_z(0.0, u[1]) * sin;
+        let direction = self.frame.to_world(turn.with_z(1.0 - drop)).normalize();
+        Some(LightSample { direction, distance, radiance: self.radiance() / self.pdf(), pdf: self.pdf() })
+    }
+
+    #[inline]
+    pub(super) fn passed(&self, ray: &Ray) -> Option<Passed> {
+        // |w - d|^2 = 2 (1 - cos), exact where the cosine itself has lost its bits.
+        let drop = 0.5 * (ray.direction - self.frame.w).length_squared();
+        let inside = !self.is_sharp() && drop <= self.cap;
+        inside.then(|| Passed { distance: f32::INFINITY, radiance: self.radiance(), pdf: self.pdf() })
+    }
+
+    pub(super) fn strength(&self) -> f64 {
+        f64::from(self.irradiance.luminance())
+    }
+}

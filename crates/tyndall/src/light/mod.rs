@@ -1,0 +1,129 @@
+//! Sources of light. They are sources only: the camera does not see them (but for a visible
+//! environment), they cast no shadow and block nothing, and they may stand inside the volume.
+
+mod area;
+mod directional;
+mod emission;
+mod environment;
+mod point;
+mod set;
+
+pub use area::{Disk, Rect, SphereLight};
+pub use directional::Directional;
+pub use emission::Emission;
+pub use environment::{Environment, Map, MapError};
+pub use point::PointLight;
+pub use set::LightSet;
+
+use crate::math::{Ray, Rgb, Vec3};
+
+/// A sphere around all that can be lit: what lights judge their power by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target {
+    /// Middle, world.
+    pub center: Vec3,
+    /// Radius, world units; positive.
+    pub radius: f32,
+}
+
+/// A direction towards a light, drawn from a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightSample {
+    /// Unit vector to the light.
+    pub direction: Vec3,
+    /// How far the light is; infinite for distant ones.
+    pub distance: f32,
+    /// What arrives in empty space, over the density of drawing it: its mean times the scattering
+    /// function is the light scattered.
+    pub radiance: Rgb,
+    /// Density over solid angle; infinite where no other way could draw this direction.
+    pub pdf: f32,
+}
+
+/// A light that a ray passes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passed {
+    /// Where on the ray; infinite for distant ones.
+    pub distance: f32,
+    /// Radiance towards the ray's origin.
+    pub radiance: Rgb,
+    /// Density with which [`Light::sample`] from the ray's origin would have drawn its direction.
+    pub pdf: f32,
+}
+
+/// Any light of the scene document.
+#[derive(Clone, Debug)]
+pub enum Light {
+    /// Parallel light, or nearly so.
+    Directional(Directional),
+    /// From one point.
+    Point(PointLight),
+    /// From a rectangle.
+    Rect(Rect),
+    /// From a disk.
+    Disk(Disk),
+    /// From a sphere.
+    Sphere(SphereLight),
+    /// From all around.
+    Environment(Environment),
+}
+
+impl Light {
+    /// Draws a direction towards the light from a world point; `None` if it sends nothing there.
+    #[inline]
+    #[must_use]
+    pub fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        match self {
+            Self::Directional(l) => l.sample(u),
+            Self::Point(l) => l.sample(from),
+            Self::Rect(l) => l.sample(from, u),
+            Self::Disk(l) => l.sample(from, u),
+            Self::Sphere(l) => l.sample(from, u),
+            Self::Environment(l) => l.sample(u),
+        }
+    }
+
+    /// The light's place on a ray, if the ray passes its shining side.
+    #[inline]
+    #[must_use]
+    pub fn passed(&self, ray: &Ray) -> Option<Passed> {
+        match self {
+            Self::Directional(l) => l.passed(ray),
+            Self::Point(_) => None,
+            Self::Rect(l) => l.passed(ray),
+            Self::Disk(l) => l.passed(ray),
+            Self::Sphere(l) => l.passed(ray),
+            Self::Environment(l) => Some(l.passed(ray)),
+        }
+    }
+
+    /// Whether a ray can pass it at all: not so for points and parallel light.
+    #[must_use]
+    pub fn can_be_passed(&self) -> bool {
+        match self {
+            Self::Directional(l) => !l.is_sharp(),
+            Self::Point(_) => false,
+            _ => true,
+        }
+    }
+
+    /// Luminance of the light that reaches the target, roughly, as an irradiance: the weight by which
+    /// lights are chosen. Positive for every light that shines.
+    #[must_use]
+    pub fn strength(&self, target: &Target) -> f64 {
+        match self {
+            Self::Directional(l) => l.strength(),
+            Self::Point(l) => l.strength(target),
+            Self::Rect(l) => l.strength(target),
+            Self::Disk(l) => l.strength(target),
+            Self::Sphere(l) => l.strength(target),
+            Self::Environment(l) => l.strength(),
+        }
+    }
+}
+
+/// Luminance of a radiance seen under the area of a small source from a target, as an irradiance.
+fn strength_of_area(radiance: Rgb, area: f32, place: Vec3, target: &Target) -> f64 {
+    let distance = place.distance(target.center).max(target.radius);
+    f64::from(radiance.luminance()) * f64::from(area) / f64::from(distance * distance)
+}

@@ -1,0 +1,189 @@
+//! The medium: a volume seen through a transfer function, cut by clips, crossed by light.
+//!
+//! Extinction is scalar, `sigma_t(v) = density * opacity(v)` per world unit; colour enters as albedo.
+
+mod clip;
+mod free_flight;
+mod majorants;
+
+pub use clip::{Clip, ClipShape};
+pub use free_flight::Collision;
+pub use majorants::{CellStretch, MajorantGrid};
+
+use crate::math::{Interval, Ray, Rgb, Vec3, cast};
+use crate::scattering::{Brdf, Event, Phase, Surface, surface_share};
+use crate::transfer::{Optics, TransferFunction};
+use crate::volume::Volume;
+use std::sync::Arc;
+
+/// What a medium is made of; see [`Medium::new`].
+#[derive(Clone, Debug)]
+pub struct MediumSettings {
+    /// Extinction per world unit at opacity 1; at least 0.
+    pub density: f32,
+    /// How light turns where it scatters.
+    pub phase: Phase,
+    /// How light is reflected where the data have a surface.
+    pub brdf: Brdf,
+    /// How fast matter becomes a surface as the gradient grows.
+    pub gradient_factor: f32,
+    /// What is cut away.
+    pub clip: Vec<ClipShape>,
+    /// Voxels along the edge of a majorant cell; 0 is one global majorant.
+    pub majorant_cell: usize,
+}
+
+/// A volume seen through a transfer function. Cheap to clone.
+#[derive(Clone, Debug)]
+pub struct Medium {
+    volume: Arc<Volume>,
+    transfer: Arc<TransferFunction>,
+    majorants: Arc<MajorantGrid>,
+    clip: Clip,
+    density: f32,
+    phase: Phase,
+    brdf: Brdf,
+    gradient_factor: f32,
+}
+
+/// A ray inside the medium: in index space, where `t` is still the world distance, from where it
+/// enters to where it leaves or ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Track {
+    /// Starts where the medium does, which keeps distances small and so exact.
+    ray: Ray,
+    /// World distance through the medium.
+    length: f32,
+    /// World distance before it.
+    before: f32,
+}
+
+impl Track {
+    /// World distance through the medium; 0 when the ray misses it.
+    #[must_use]
+    pub fn length(&self) -> f32 {
+        self.length
+    }
+
+    /// World distance from the ray's origin to a distance inside the medium.
+    #[must_use]
+    pub fn distance(&self, t: f32) -> f32 {
+        self.before + t
+    }
+
+    /// Index-space place at a distance inside the medium.
+    #[inline]
+    #[must_use]
+    pub fn at(&self, t: f32) -> Vec3 {
+        self.ray.at(t)
+    }
+}
+
+impl Medium {
+    /// Looks at `volume` through `transfer`; builds the majorants, in parallel on the current pool.
+    #[must_use]
+    pub fn new(volume: Arc<Volume>, transfer: Arc<TransferFunction>, settings: &MediumSettings) -> Self {
+        let majorants = MajorantGrid::new(&volume, &transfer, settings.majorant_cell);
+        Self {
+            clip: Clip::new(volume.grid(), &settings.clip),
+            majorants: Arc::new(majorants),
+            density: settings.density,
+            phase: settings.phase,
+            brdf: settings.brdf,
+            gradient_factor: settings.gradient_factor,
+            volume,
+            transfer,
+        }
+    }
+
+    /// The data.
+    #[must_use]
+    pub fn volume(&self) -> &Volume {
+        &self.volume
+    }
+
+    /// The function from values to optics.
+    #[must_use]
+    pub fn transfer(&self) -> &TransferFunction {
+        &self.transfer
+    }
+
+    /// Opacity bounds per cell.
+    #[must_use]
+    pub fn majorants(&self) -> &MajorantGrid {
+        &self.majorants
+    }
+
+    /// Extinction per world unit at opacity 1.
+    #[must_use]
+    pub fn density(&self) -> f32 {
+        self.density
+    }
+
+    /// The phase function.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// The part of a world ray, up to world distance `end`, that lies in the medium and is not cut away.
+    #[inline]
+    #[must_use]
+    pub fn track(&self, ray: &Ray, end: f32) -> Track {
+        let grid = self.volume.grid();
+        let inside = grid.ray_to_index(ray);
+        let stretch = grid.index_bounds().intersect(&inside).intersect(Interval::up_to(end));
+        let stretch = self.clip.cut(&inside, stretch);
+        if stretch.is_empty() {
+            return Track { ray: inside, length: 0.0, before: 0.0 };
+        }
+        let ray = Ray::new(inside.at(stretch.start), inside.direction);
+        Track { ray, length: stretch.end - stretch.start, before: stretch.start }
+    }
+
+    /// Whether matter may be at an index-space place: inside the box and not cut away.
+    #[must_use]
+    pub fn contains(&self, p: Vec3) -> bool {
+        self.volume.grid().index_bounds().contains(p) && self.clip.keeps(p)
+    }
+
+    /// Extinction per world unit at an index-space place.
+    #[inline]
+    #[must_use]
+    pub fn sigma_t(&self, p: Vec3) -> f32 {
+        self.density * self.transfer.opacity(self.volume.value(p))
+    }
+
+    /// All optics at an index-space place.
+    #[inline]
+    #[must_use]
+    pub fn optics(&self, p: Vec3) -> Optics {
+        self.transfer.optics(self.volume.value(p))
+    }
+
+    /// The scattering function at an index-space place; the gradient is read only where it matters.
+    #[inline]
+    #[must_use]
+    pub fn event(&self, p: Vec3, optics: &Optics) -> Event {
+        let surface =
+            Surface { albedo: optics.albedo, specular: optics.specular, roughness: optics.roughness };
+        let mut event = Event { phase: self.phase, brdf: self.brdf, surface, normal: None, q: 0.0 };
+        if optics.surface > 0.0 {
+            let gradient = self.volume.gradient(p);
+            let length = gradient.length();
+            let [lo, hi] = self.volume.robust_range();
+            let range = cast::single(hi - lo);
+            let h = self.volume.grid().voxel_size();
+            event.q = surface_share(optics.surface, self.gradient_factor, length, h, range);
+            event.normal = (event.q > 0.0).then(|| gradient / length);
+        }
+        event
+    }
+
+    /// Radiance that matter adds per unit of extinction on a path, `(1 - albedo) Le`.
+    #[inline]
+    #[must_use]
+    pub fn emitted(optics: &Optics) -> Rgb {
+        (Rgb::WHITE - optics.albedo) * optics.emission
+    }
+}

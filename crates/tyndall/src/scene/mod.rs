@@ -1,0 +1,83 @@
+//! A scene: everything that decides a picture, as one immutable value, cheap to clone.
+
+use crate::camera::Camera;
+use crate::light::LightSet;
+use crate::math::Rgb;
+use crate::medium::Medium;
+use std::sync::Arc;
+
+/// Everything that decides a picture.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The matter.
+    pub medium: Arc<Medium>,
+    /// What shines on it.
+    pub lights: Arc<LightSet>,
+    /// Who looks.
+    pub camera: Camera,
+    /// Width and height of the picture; at least 1 each.
+    pub size: [u32; 2],
+    /// What is behind everything.
+    pub background: Background,
+    /// How light is computed.
+    pub render: RenderSettings,
+}
+
+/// What the camera sees behind everything.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Background {
+    /// The visible environments; black without one.
+    Environment,
+    /// Nothing: the picture is transparent there.
+    Transparent,
+    /// A colour that lights nothing.
+    Color(Rgb),
+}
+
+/// How light is computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// By which method.
+    pub integrator: IntegratorKind,
+    /// Light that scattered more often is left out.
+    pub max_scatter: u32,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+/// A method of computing light, with its own settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum IntegratorKind {
+    /// Emission, absorption and single scattering by marching; deterministic.
+    RayMarch {
+        /// Step in voxels.
+        step: f32,
+        /// Fixed points on each area or environment light.
+        light_samples: u32,
+    },
+    /// Unbiased Monte Carlo.
+    Path,
+}
+
+impl IntegratorKind {
+    /// The name in the scene document.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RayMarch { .. } => "raymarch",
+            Self::Path => "path",
+        }
+    }
+}
+
+impl Scene {
+    /// Radiance and alpha of a camera ray that meets nothing.
+    #[must_use]
+    pub fn behind(&self, direction: crate::math::Vec3) -> Rgb {
+        match self.background {
+            Background::Environment => self.lights.sky(direction),
+            Background::Transparent => Rgb::BLACK,
+            Background::Color(color) => color,
+        }
+    }
+}
