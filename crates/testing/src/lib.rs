@@ -1,1 +1,69 @@
 //! Statistical tests and picture comparison: numbers in, verdict out; knows no renderer.
+//!
+//! A Monte Carlo estimator is a random variable, so "equal within a tolerance" is not a test of it: a tolerance
+//! wide enough for the noise hides the bug, a narrow one fails by chance. The tests here ask instead how likely
+//! the observed numbers would be if the code were right [Subr07], and reject at a chosen [`SIGNIFICANCE`].
+//!
+//! | to test | use |
+//! | --- | --- |
+//! | a sampler of directions against its pdf | [`ChiSquare::directions`] |
+//! | distances, or any number with a known distribution | [`ChiSquare::against_cdf`] |
+//! | a choice among a few | [`ChiSquare::discrete`] |
+//! | an estimate against a known answer | [`Mean::against`], then [`ZTest::assert`] or [`ZTest::assert_within`] |
+//! | a picture against another | [`Picture::compare`], then [`Comparison::assert`] |
+//! | the known answer itself, where it is an integral | [`quadrature`] |
+//!
+//! Seeds are fixed, so a pass stays a pass. A test that judges many things at once (ten mean cosines, all pixels
+//! of a picture) says so, and the significance of each is corrected so that the whole keeps its own.
+//!
+//! # A new sampler's test
+//! ```
+//! use std::f64::consts::PI;
+//! use tyndall_testing::ChiSquare;
+//!
+//! // Directions on the upper hemisphere, in proportion to the cosine with the normal z.
+//! let sample = |[a, b]: [f32; 2]| {
+//!     let (sin, phi) = (a.sqrt(), std::f32::consts::TAU * b);
+//!     Some([sin * phi.cos(), sin * phi.sin(), (1.0 - a).sqrt()])
+//! };
+//! let pdf = |w: [f32; 3]| f64::from(w[2].max(0.0)) / PI;
+//! ChiSquare::default().directions(sample, pdf).assert();
+//!
+//! // The test would have noticed a forgotten cosine.
+//! let uniform = |w: [f32; 3]| if w[2] > 0.0 { 0.5 / PI } else { 0.0 };
+//! assert!(!ChiSquare::default().directions(sample, uniform).passes());
+//! ```
+//!
+//! # A new estimator's test
+//! ```
+//! use tyndall_testing::{Mean, SplitMix};
+//!
+//! // The light that crosses a slab of optical depth 1, by counting the photons that get through.
+//! let mut random = SplitMix::new(1);
+//! let crosses = |_| if -(1.0 - random.uniform()).ln() > 1.0 { 1.0 } else { 0.0 };
+//! let transmittance: Mean = (0..4_000_000).map(crosses).collect();
+//! transmittance.against((-1.0_f64).exp()).assert_within(3.0, 1e-3);
+//! ```
+
+mod cast;
+mod chi_square;
+mod failure;
+mod fit;
+mod picture;
+pub mod quadrature;
+mod significance;
+mod sphere_grid;
+mod split_mix;
+mod z_test;
+
+pub use chi_square::ChiSquare;
+pub use fit::{Fault, Fit};
+pub use picture::{Comparison, Picture, Worst};
+pub use significance::{SIGNIFICANCE, sidak};
+pub use split_mix::SplitMix;
+pub use z_test::{Mean, ZTest};
+
+/// Relative rounding granted to a number that a renderer kept in single precision: a few last places.
+///
+/// Without it an estimator free of noise, whose standard error is zero, would have to be exact to the last bit.
+pub const ROUNDING: f64 = 4.0 * f32::EPSILON as f64;
