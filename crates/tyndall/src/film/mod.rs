@@ -3,6 +3,8 @@
 //! It is cut into tiles that each thread has for itself, so that pixels next to each other never
 //! share a cache line across threads and each tile may be a sample ahead of another.
 
+pub mod tone;
+
 use crate::math::{Rgb, cast};
 
 /// What one sample of a pixel found.
