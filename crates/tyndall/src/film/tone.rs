@@ -42,7 +42,7 @@ impl ToneCurve {
 /// The sRGB code value of a linear one [IEC 61966-2-1]; what lies outside [0, 1] is clipped, NaN is 0.
 #[must_use]
 pub fn encode_srgb(linear: f32) -> f32 {
-    let x = linear.max(0.0).min(1.0);
+    let x = clip(linear, 1.0);
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
@@ -58,7 +58,12 @@ const BRIGHTEST: f32 = 1e10;
 
 fn expose(linear: Rgb, stops: f32) -> Rgb {
     let gain = stops.exp2();
-    linear.map(|x| (x * gain).max(0.0).min(BRIGHTEST))
+    linear.map(|x| clip(x * gain, BRIGHTEST))
+}
+
+/// To [0, high]; unlike `clamp`, takes NaN to 0.
+fn clip(x: f32, high: f32) -> f32 {
+    if x > 0.0 { x.min(high) } else { 0.0 }
 }
 
 /// [Narkowicz16]: five numbers fitted to the reference and output device transforms.
@@ -75,12 +80,12 @@ const AGX_STOPS: [f32; 2] = [-12.473_93, 4.026_069];
 const AGX_INSET: Matrix = rows_to_one([
     [0.842_479_06, 0.078_433_6, 0.079_223_745],
     [0.042_328_242, 0.878_468_64, 0.079_166_13],
-    [0.042_375_655, 0.078_433_6, 0.879_142_97],
+    [0.042_375_655, 0.078_433_6, 0.879_143],
 ]);
 
 /// The way back, after the contrast curve [Wrensch23].
 const AGX_OUTSET: Matrix = rows_to_one([
-    [1.196_879, -0.098_020_88, -0.099_029_744],
+    [1.196_879, -0.098_020_88, -0.099_029_74],
     [-0.052_896_85, 1.151_903_1, -0.098_961_18],
     [-0.052_971_635, -0.098_043_45, 1.151_073_7],
 ]);
