@@ -1,1 +1,3 @@
 //! Reads volumes and maps, writes pictures.
+
+pub mod image;

@@ -1,0 +1,161 @@
+//! What can go wrong with a picture, each with its mend.
+
+use std::io::{Error, ErrorKind};
+use std::path::{Path, PathBuf};
+
+/// A picture or map that could not be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The file's name does not tell a known kind.
+    #[error("{}: {found}; give it one of {known}", path.display())]
+    Extension {
+        /// The file.
+        path: PathBuf,
+        /// What stands at the end of its name.
+        found: String,
+        /// The extensions that are known.
+        known: &'static str,
+    },
+    /// The disk does not take the file.
+    #[error("{}: cannot write the picture: {source}; {mend}", path.display())]
+    Unwritable {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: Error,
+        /// What to do.
+        mend: String,
+    },
+    /// The disk does not give the file.
+    #[error("{}: cannot read the picture: {source}; {mend}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        source: Error,
+        /// What to do.
+        mend: String,
+    },
+    /// The picture has more pixels than the kind of file, or this program, can hold.
+    #[error("{}: {width} x {height} pixels, expected at most {limit}; {mend}", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Pixels in a row.
+        width: u64,
+        /// Rows.
+        height: u64,
+        /// The most that fits.
+        limit: String,
+        /// What to do.
+        mend: &'static str,
+    },
+    /// The file's library refused the picture.
+    #[error("{}: cannot encode the picture: {reason}; try another kind of file", path.display())]
+    Encode {
+        /// The file.
+        path: PathBuf,
+        /// The library's reason.
+        reason: String,
+    },
+    /// The file's content is damaged, or of a variant that is not read.
+    #[error("{}: not a readable {kind} file: {reason}; copy or save it again", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// The kind that its first bytes or its name promise.
+        kind: &'static str,
+        /// What was found and what was expected.
+        reason: String,
+    },
+    /// The file is not one of the kinds that carry metadata.
+    #[error("{}: found no picture, expected PNG, JPEG, TIFF or OpenEXR content; name a picture that Tyndall wrote", path.display())]
+    NotAPicture {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A texel of a map is not a radiance.
+    #[error("{}: texel ({x}, {y}) is {value:?}, expected finite values of at least 0; repair it in the map", path.display())]
+    Texel {
+        /// The file.
+        path: PathBuf,
+        /// Column, from the left.
+        x: usize,
+        /// Row, from the top.
+        y: usize,
+        /// Its red, green and blue.
+        value: [f32; 3],
+    },
+}
+
+impl ImageError {
+    pub(super) fn extension(path: &Path, known: &'static str) -> Self {
+        let found = match path.extension() {
+            Some(extension) => format!("unknown kind `.{}`", extension.to_string_lossy()),
+            None => "no extension".to_owned(),
+        };
+        Self::Extension { path: path.to_owned(), found, known }
+    }
+
+    pub(super) fn unwritable(path: &Path, source: Error) -> Self {
+        let folder = folder_of(path);
+        let mend = match source.kind() {
+            ErrorKind::NotFound => format!("create the folder {} first", folder.display()),
+            ErrorKind::NotADirectory => format!("choose another place: {} is no folder", folder.display()),
+            ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
+                "choose a file and folder that you may write to".to_owned()
+            }
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+                "free some space or use another disk".to_owned()
+            }
+            ErrorKind::IsADirectory => "add a file name to it".to_owned(),
+            _ => "choose another place".to_owned(),
+        };
+        Self::Unwritable { path: path.to_owned(), source, mend }
+    }
+
+    pub(super) fn unreadable(path: &Path, source: Error) -> Self {
+        let mend = match source.kind() {
+            ErrorKind::PermissionDenied => "ask for the right to read it",
+            ErrorKind::IsADirectory => "name a file inside it",
+            _ => "check the path",
+        };
+        Self::Unreadable { path: path.to_owned(), source, mend: mend.to_owned() }
+    }
+
+    pub(super) fn malformed(path: &Path, kind: &'static str, reason: String) -> Self {
+        Self::Malformed { path: path.to_owned(), kind, reason }
+    }
+}
+
+/// The folder that a file lies in.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Why an encoder gave up, before the file is known.
+#[derive(Debug)]
+pub(super) enum EncodeFailure {
+    TooLarge { width: u32, height: u32, limit: String },
+    Library(String),
+}
+
+impl EncodeFailure {
+    pub(super) fn library(error: &dyn std::error::Error) -> Self {
+        Self::Library(error.to_string())
+    }
+
+    pub(super) fn at(self, path: &Path) -> ImageError {
+        let path = path.to_owned();
+        match self {
+            Self::TooLarge { width, height, limit } => ImageError::TooLarge {
+                path,
+                width: width.into(),
+                height: height.into(),
+                limit,
+                mend: "write .png, .tif or .exr instead",
+            },
+            Self::Library(reason) => ImageError::Encode { path, reason },
+        }
+    }
+}

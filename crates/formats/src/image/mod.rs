@@ -1,0 +1,175 @@
+//! Pictures: written as PNG, JPEG, TIFF and OpenEXR, and environment maps read from OpenEXR and Radiance.
+//!
+//! The 8-bit kinds show the picture through a tone curve. OpenEXR is the record: linear float,
+//! premultiplied, with the variance of each pixel's mean and the depth as further layers.
+//! Every written picture carries its [`Metadata`], so that it can be made again.
+
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::path::Path;
+
+use tyndall::film::tone::ToneCurve;
+
+mod atomic;
+mod display;
+mod error;
+mod exr;
+mod jpeg;
+mod map;
+mod metadata;
+mod png;
+mod radiance;
+mod tiff;
+
+pub use error::ImageError;
+pub use map::{Map, read_map};
+pub use metadata::Metadata;
+
+/// A finished picture: rows from the top, each from the left.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Picture {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Linear radiance in Rec. 709 primaries, premultiplied, and the opacity in [0, 1].
+    pub rgba: Vec<[f32; 4]>,
+    /// Variance of each pixel's mean, where it is known.
+    pub variance: Option<Vec<[f32; 3]>>,
+    /// Distance from the camera to the first matter, in world units.
+    pub depth: Option<Vec<f32>>,
+    /// Whether the background shows through where the opacity is below 1.
+    pub transparent: bool,
+}
+
+impl Picture {
+    fn check(&self) {
+        let pixels = self.width as usize * self.height as usize;
+        assert!(pixels > 0, "a picture of {} x {} pixels", self.width, self.height);
+        assert_eq!(self.rgba.len(), pixels, "pixels of the picture");
+        assert_eq!(self.variance.as_ref().map_or(pixels, Vec::len), pixels, "pixels of the variance");
+        assert_eq!(self.depth.as_ref().map_or(pixels, Vec::len), pixels, "pixels of the depth");
+    }
+}
+
+/// How the 8-bit kinds show a picture; OpenEXR ignores it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Display {
+    /// From radiance to code values.
+    pub tone: ToneCurve,
+    /// Brightens by 2^exposure before the curve.
+    pub exposure: f32,
+}
+
+/// Writes a picture in the kind that the path's extension names, whatever its case.
+///
+/// The file appears whole or not at all: it is written beside its place and then moved there.
+/// JPEG has no opacity and shows a transparent picture over black.
+///
+/// # Errors
+/// [`ImageError::Extension`] for an unknown kind, [`ImageError::TooLarge`] where the kind has a limit,
+/// [`ImageError::Unwritable`] if the disk refuses.
+///
+/// # Panics
+/// If the picture is empty or its layers differ in size.
+pub fn write(
+    path: &Path,
+    picture: &Picture,
+    display: &Display,
+    metadata: &Metadata,
+) -> Result<(), ImageError> {
+    picture.check();
+    let bytes = match Kind::of_extension(path) {
+        Some(Kind::Png) => png::encode(picture, display, metadata),
+        Some(Kind::Jpeg) => jpeg::encode(picture, display, metadata),
+        Some(Kind::Tiff) => tiff::encode(picture, display, metadata),
+        Some(Kind::Exr) => exr::encode(picture, metadata),
+        None => return Err(ImageError::extension(path, ".png, .jpg, .jpeg, .tif, .tiff or .exr")),
+    };
+    let bytes = bytes.map_err(|failure| failure.at(path))?;
+    atomic::replace(path, &bytes).map_err(|source| ImageError::unwritable(path, source))
+}
+
+/// The bytes of a PNG file, for a pipe.
+///
+/// # Errors
+/// [`ImageError::TooLarge`] beyond what the kind can hold.
+///
+/// # Panics
+/// If the picture is empty or its layers differ in size.
+pub fn encode_png(picture: &Picture, display: &Display, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
+    picture.check();
+    png::encode(picture, display, metadata).map_err(|failure| failure.at(Path::new("standard output")))
+}
+
+/// What Tyndall noted in a picture of any of the four kinds, told apart by content; `None` if it noted nothing.
+///
+/// Pixels are not read, so that a picture with damaged pixels still yields its scene.
+///
+/// # Errors
+/// [`ImageError::Unreadable`] if the disk refuses, [`ImageError::NotAPicture`] for another kind of file,
+/// [`ImageError::Malformed`] for a damaged one.
+pub fn read_metadata(path: &Path) -> Result<Option<Metadata>, ImageError> {
+    let (mut file, length) = open(path)?;
+    let kind = Kind::of_content(&mut file).map_err(|source| ImageError::unreadable(path, source))?;
+    let kind = kind.ok_or_else(|| ImageError::NotAPicture { path: path.to_owned() })?;
+    let (name, read) = match kind {
+        Kind::Png => ("PNG", png::read_metadata(file)),
+        Kind::Jpeg => ("JPEG", jpeg::read_metadata(file)),
+        Kind::Tiff => ("TIFF", tiff::read_metadata(file, length)),
+        Kind::Exr => ("OpenEXR", exr::read_metadata(file)),
+    };
+    let metadata = read.map_err(|reason| ImageError::malformed(path, name, reason))?;
+    Ok(Some(metadata).filter(|metadata| !metadata.is_empty()))
+}
+
+/// Opens a regular file; a pipe or device could keep its reader waiting for ever.
+fn open(path: &Path) -> Result<(BufReader<File>, u64), ImageError> {
+    let unreadable = |source| ImageError::unreadable(path, source);
+    let about = std::fs::metadata(path).map_err(unreadable)?;
+    if !about.is_file() {
+        let kind =
+            if about.is_dir() { std::io::ErrorKind::IsADirectory } else { std::io::ErrorKind::InvalidInput };
+        return Err(unreadable(std::io::Error::new(kind, "it is not a file")));
+    }
+    let file = File::open(path).map_err(unreadable)?;
+    Ok((BufReader::new(file), about.len()))
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    Png,
+    Jpeg,
+    Tiff,
+    Exr,
+}
+
+impl Kind {
+    fn of_extension(path: &Path) -> Option<Self> {
+        match lower_extension(path).as_str() {
+            "png" => Some(Self::Png),
+            "jpg" | "jpeg" => Some(Self::Jpeg),
+            "tif" | "tiff" => Some(Self::Tiff),
+            "exr" => Some(Self::Exr),
+            _ => None,
+        }
+    }
+
+    /// By the first bytes; leaves the reader at the start.
+    fn of_content(file: &mut (impl Read + Seek)) -> std::io::Result<Option<Self>> {
+        let mut start = Vec::new();
+        file.by_ref().take(4).read_to_end(&mut start)?;
+        file.rewind()?;
+        Ok(match start.as_slice() {
+            b"\x89PNG" => Some(Self::Png),
+            [0xFF, 0xD8, 0xFF, _] => Some(Self::Jpeg),
+            b"II\x2A\0" | b"MM\0\x2A" | b"II\x2B\0" | b"MM\0\x2B" => Some(Self::Tiff),
+            b"\x76\x2F\x31\x01" => Some(Self::Exr),
+            _ => None,
+        })
+    }
+}
+
+fn lower_extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
