@@ -26,8 +26,24 @@ impl AutoView {
     }
 }
 
-/// Vertical field of view of automatic cameras, degrees.
-const FOV: f32 = 35.0;
+/// What an automatic camera sees through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FitLens {
+    /// With vanishing points; focused on the volume's middle unless told.
+    Perspective {
+        /// Vertical field of view at zoom 1, degrees.
+        fov: f32,
+        /// As [`Lens::Perspective`].
+        aperture: f32,
+        /// As [`Lens::Perspective`].
+        focus: Option<f32>,
+    },
+    /// Parallel rays; as high as the volume needs unless told.
+    Orthographic {
+        /// As [`Lens::Orthographic`], at zoom 1.
+        height: Option<f32>,
+    },
+}
 
 /// Share of the picture left free around the volume.
 const MARGIN: f32 = 0.04;
@@ -36,7 +52,8 @@ const MARGIN: f32 = 0.04;
 ///
 /// The front is -y for anatomical volumes (LPS: the patient's face) and +z for others.
 #[must_use]
-pub fn fit(grid: &Grid, view: AutoView, size: [u32; 2]) -> Camera {
+pub fn fit(grid: &Grid, view: AutoView, up: Option<Vec3>, lens: FitLens, size: [u32; 2]) -> Camera {
+    let chosen_up = up;
     let up = grid.space().up();
     let front = match grid.space() {
         Space::Anatomical => -Vec3::Y,
@@ -48,19 +65,29 @@ pub fn fit(grid: &Grid, view: AutoView, size: [u32; 2]) -> Camera {
     let outwards = (front * cos_a + right * sin_a) * cos_e + up * sin_e;
     // Straight from above or below, up is what was ahead.
     let up = if cos_e.abs() < 1e-3 { -(front * cos_a + right * sin_a) * sin_e.signum() } else { up };
+    let up = chosen_up.filter(|up| up.cross(outwards).length() > 1e-3 * up.length()).unwrap_or(up);
 
     let middle = grid.world_bounds().center();
-    let probe = Camera::new(middle + outwards, middle, up, Lens::Orthographic { height: 1.0 });
-    let tan_y = (0.5 * FOV).to_radians().tan() * (1.0 - MARGIN);
-    let tan_x = tan_y * size[0] as f32 / size[1] as f32;
-    let distance = grid.world_corners().iter().fold(0.0_f32, |most, corner| {
-        let local = probe.frame.to_local(*corner - middle);
-        most.max((local.x.abs() / tan_x).max(local.y.abs() / tan_y) - local.z)
-    });
-    // Zooming narrows the view and keeps the place, so that the perspective stays and the camera
-    // never enters the volume.
-    let fov = 2.0 * ((0.5 * FOV).to_radians().tan() / view.zoom).atan().to_degrees();
-    let lens = Lens::Perspective { fov, aperture: 0.0, focus: distance };
+    let frame = Camera::new(middle + outwards, middle, up, Lens::Orthographic { height: 1.0 }).frame;
+    let corners = grid.world_corners().map(|corner| frame.to_local(corner - middle));
+    let aspect = size[0] as f32 / size[1] as f32;
+    // Half the picture's height that a corner needs where it stands.
+    let needed = |corner: &Vec3| (corner.x.abs() / aspect).max(corner.y.abs()) / (1.0 - MARGIN);
+    let most = |f: &dyn Fn(&Vec3) -> f32| corners.iter().map(f).fold(0.0, f32::max);
+    let (distance, lens) = match lens {
+        FitLens::Perspective { fov, aperture, focus } => {
+            let tan = (0.5 * fov.to_radians()).tan();
+            let distance = most(&|corner| needed(corner) / tan - corner.z);
+            // Zooming narrows the view and keeps the place, so that the perspective stays and the
+            // camera never enters the volume.
+            let fov = 2.0 * (tan / view.zoom).atan().to_degrees();
+            (distance, Lens::Perspective { fov, aperture, focus: focus.unwrap_or(distance) })
+        }
+        FitLens::Orthographic { height } => {
+            let height = height.unwrap_or_else(|| 2.0 * most(&needed)) / view.zoom;
+            (2.0 * most(&|corner| corner.length()), Lens::Orthographic { height })
+        }
+    };
     Camera::new(middle + outwards * distance, middle, up, lens)
 }
 
@@ -70,12 +97,16 @@ mod tests {
 
     const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
+    const PERSPECTIVE: FitLens = FitLens::Perspective { fov: 35.0, aperture: 0.0, focus: None };
+
     /// Film coordinates of a world point, from -1 to 1 over the picture.
     fn project(camera: &Camera, p: Vec3, aspect: f32) -> [f32; 2] {
-        let Lens::Perspective { fov, .. } = camera.lens else { panic!("automatic cameras are perspective") };
         let local = camera.frame.to_local(p - camera.position);
-        let tan = (0.5 * fov.to_radians()).tan();
-        [local.x / local.z / tan / aspect, local.y / local.z / tan]
+        let half = match camera.lens {
+            Lens::Perspective { fov, .. } => (0.5 * fov.to_radians()).tan() * local.z,
+            Lens::Orthographic { height } => 0.5 * height,
+        };
+        [local.x / half / aspect, local.y / half]
     }
 
     #[test]
@@ -87,20 +118,22 @@ mod tests {
             (Space::Plain, -70.0, -90.0, [64, 64]),
         ] {
             let grid = Grid::new([40, 80, 20], [1.0, 0.7, 2.0], IDENTITY, [5.0, -60.0, 9.0], space).unwrap();
-            let camera = fit(&grid, AutoView { azimuth, elevation, zoom: 1.0 }, size);
             let aspect = size[0] as f32 / size[1] as f32;
-            let reach = grid.world_corners().iter().fold(0.0_f32, |m, &c| {
-                let [x, y] = project(&camera, c, aspect);
-                m.max(x.abs()).max(y.abs())
-            });
-            assert!((reach - (1.0 - MARGIN)).abs() < 1e-3, "reach {reach} from {azimuth}, {elevation}");
+            for lens in [PERSPECTIVE, FitLens::Orthographic { height: None }] {
+                let camera = fit(&grid, AutoView { azimuth, elevation, zoom: 1.0 }, None, lens, size);
+                let reach = grid.world_corners().iter().fold(0.0_f32, |m, &c| {
+                    let [x, y] = project(&camera, c, aspect);
+                    m.max(x.abs()).max(y.abs())
+                });
+                assert!((reach - (1.0 - MARGIN)).abs() < 1e-3, "reach {reach} from {azimuth}, {elevation}");
+            }
         }
     }
 
     #[test]
     fn a_patient_is_seen_from_the_front_with_the_head_up() {
         let grid = Grid::new([10; 3], [1.0; 3], IDENTITY, [0.0; 3], Space::Anatomical).unwrap();
-        let camera = fit(&grid, AutoView::default_for(Space::Anatomical), [100, 100]);
+        let camera = fit(&grid, AutoView::default_for(Space::Anatomical), None, PERSPECTIVE, [100, 100]);
         assert!((camera.view() - Vec3::Y).length() < 1e-6);
         assert!((camera.frame.v - Vec3::Z).length() < 1e-6);
         // The patient's left, +x, is to the right of the picture.

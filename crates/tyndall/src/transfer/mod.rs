@@ -4,6 +4,10 @@
 //! which the later holds from there. It is evaluated exactly, segment by segment, so there is no
 //! table whose error would have to be bounded; a small index finds the segment in constant time.
 
+mod presets;
+
+pub use presets::{PRESETS, Preset};
+
 use crate::math::{Rgb, cast};
 
 /// The optics of matter at one data value.

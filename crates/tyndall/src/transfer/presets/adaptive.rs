@@ -1,0 +1,141 @@
+//! Presets that find their thresholds in the histogram.
+
+use super::{Profile, matter};
+use crate::math::cast;
+use crate::transfer::Point;
+
+const TISSUE: [f32; 3] = [0.90, 0.70, 0.60];
+const BRIGHT: [f32; 3] = [0.95, 0.88, 0.80];
+const STONE: [f32; 3] = [0.90, 0.85, 0.76];
+const WHITE: [f32; 3] = [0.97, 0.97, 0.97];
+
+/// The threshold between two classes of values by Otsu's criterion [Otsu79], as a share of the range:
+/// the one that separates the classes' means most, weighed by their sizes.
+fn otsu(profile: &Profile) -> f64 {
+    let counts = &profile.histogram.counts;
+    let total: f64 = counts.iter().map(|&n| n as f64).sum();
+    let moment: f64 = counts.iter().enumerate().map(|(i, &n)| i as f64 * n as f64).sum();
+    let (mut below, mut below_moment) = (0.0, 0.0);
+    // Between well-parted classes the criterion is level: its middle is the natural place.
+    let (mut best, mut first, mut last) = (-1.0, 0, 0);
+    for (i, &n) in counts.iter().enumerate() {
+        below += n as f64;
+        below_moment += i as f64 * n as f64;
+        let above = total - below;
+        if below == 0.0 || above <= 0.0 {
+            continue;
+        }
+        let gap = below_moment / below - (moment - below_moment) / above;
+        let separation = below * above * gap * gap;
+        if separation > best * (1.0 + 1e-9) {
+            (best, first) = (separation, i);
+        }
+        if separation >= best * (1.0 - 1e-9) {
+            last = i;
+        }
+    }
+    if best < 0.0 { 0.0 } else { (0.5 * (first + last) as f64 + 1.0) / counts.len() as f64 }
+}
+
+/// Whether nearly all values lie near the two ends of the range: a segmented or binary volume.
+pub(super) fn is_two_phase(profile: &Profile) -> bool {
+    let counts = &profile.histogram.counts;
+    let tenth = counts.len() / 10;
+    let total: u64 = counts.iter().sum();
+    let low: u64 = counts[..tenth].iter().sum();
+    let high: u64 = counts[counts.len() - tenth..].iter().sum();
+    let share = |n: u64| n as f64 / total as f64;
+    share(low) > 0.05 && share(high) > 0.05 && share(low) + share(high) > 0.8
+}
+
+/// Keeps thresholds apart when the data have no width.
+fn ascending(mut points: Vec<Point>) -> Vec<Point> {
+    for i in 1..points.len() {
+        let before = points[i - 1].value;
+        if points[i].value <= before {
+            points[i].value = before.next_up();
+        }
+    }
+    points
+}
+
+pub(super) fn mri(profile: &Profile) -> Vec<Point> {
+    let t = otsu(profile);
+    ascending(vec![
+        matter(profile.at(0.55 * t), 0.0, TISSUE, 0.4),
+        matter(profile.at(t), 0.35, TISSUE, 0.6),
+        matter(profile.at(t + 0.4 * (1.0 - t)), 0.7, TISSUE, 0.6),
+        matter(profile.at(1.0), 1.0, BRIGHT, 0.6),
+    ])
+}
+
+pub(super) fn mri_glass(profile: &Profile) -> Vec<Point> {
+    let t = otsu(profile);
+    ascending(vec![
+        matter(profile.at(0.5 * t), 0.0, TISSUE, 0.0),
+        matter(profile.at(0.9 * t), 0.01, TISSUE, 0.3),
+        matter(profile.at(t + 0.5 * (1.0 - t)), 0.03, TISSUE, 0.3),
+        matter(profile.at(1.0), 0.5, BRIGHT, 0.5),
+    ])
+}
+
+pub(super) fn solid(profile: &Profile) -> Vec<Point> {
+    let t = otsu(profile);
+    ascending(vec![
+        matter(profile.at(t - 0.08), 0.0, STONE, 0.7),
+        matter(profile.at(t + 0.08), 1.0, STONE, 0.7),
+    ])
+}
+
+pub(super) fn cloud(profile: &Profile) -> Vec<Point> {
+    // The commonest value is the background when it lies at the bottom, as it mostly does.
+    let counts = &profile.histogram.counts;
+    let mode = (0..counts.len()).max_by_key(|&i| counts[i]).unwrap_or(0) as f64 / counts.len() as f64;
+    let floor = if mode < 0.3 { mode + 0.02 } else { 0.0 };
+    if profile.at(1.0) <= profile.at(0.0) {
+        return vec![matter(profile.at(0.0), 0.3, WHITE, 0.0)];
+    }
+    ascending(vec![matter(profile.at(floor), 0.0, WHITE, 0.0), matter(profile.at(1.0), 1.0, WHITE, 0.0)])
+}
+
+pub(super) fn layers(profile: &Profile) -> Vec<Point> {
+    const COLORS: [[f32; 3]; 4] =
+        [[0.35, 0.55, 0.90], [0.40, 0.80, 0.50], [0.95, 0.75, 0.30], [0.92, 0.35, 0.25]];
+    let t = 0.7 * otsu(profile);
+    let layer = |(i, color): (usize, &[f32; 3])| {
+        let middle = t + (1.0 - t) * (i as f64 + 0.5) / COLORS.len() as f64;
+        let half = (1.0 - t) * 0.06;
+        let opacity = 0.06 * 2.5_f32.powi(cast::fit_u32(i).cast_signed());
+        [
+            matter(profile.at(middle - half), 0.0, *color, 0.6),
+            matter(profile.at(middle), opacity.min(1.0), *color, 0.6),
+            matter(profile.at(middle + half), 0.0, *color, 0.6),
+        ]
+    };
+    ascending(COLORS.iter().enumerate().flat_map(layer).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::Histogram;
+
+    #[test]
+    fn the_threshold_falls_between_two_humps() {
+        let hump = |i: i32, at: i32, n: f64| n * (-f64::from((i - at).pow(2)) / 200.0).exp();
+        let counts = (0..256).map(|i| (hump(i, 20, 9e5) + hump(i, 150, 1e5)) as u64).collect();
+        let profile = Profile { histogram: Histogram { range: [0.0, 1.0], counts } };
+        let t = otsu(&profile);
+        assert!((0.2..0.5).contains(&t), "{t}");
+        assert!(!is_two_phase(&profile));
+    }
+
+    #[test]
+    fn two_values_are_parted_in_the_middle() {
+        let mut counts = vec![0; 256];
+        (counts[0], counts[255]) = (500, 500);
+        let profile = Profile { histogram: Histogram { range: [0.0, 1.0], counts } };
+        assert!((otsu(&profile) - 0.5).abs() < 0.01);
+        assert!(is_two_phase(&profile));
+    }
+}

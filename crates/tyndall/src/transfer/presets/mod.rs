@@ -1,0 +1,176 @@
+//! Transfer functions ready to use: for CT in Hounsfield units, for MRI, and for any data, adapted to
+//! the distribution of its values.
+
+mod adaptive;
+mod ct;
+
+use super::{Optics, Point};
+use crate::math::{Rgb, cast};
+use crate::volume::procedural::MATERIALS;
+use crate::volume::{Histogram, Space, Volume};
+
+/// A transfer function by name.
+#[derive(Clone, Copy, Debug)]
+pub struct Preset {
+    /// The name in the scene document.
+    pub name: &'static str,
+    /// What it shows, in one line.
+    pub about: &'static str,
+    points: fn(&Profile) -> Vec<Point>,
+}
+
+/// All presets.
+pub const PRESETS: [Preset; 11] = [
+    Preset { name: "ct-bone", about: "CT: bone alone, as a solid", points: ct::bone },
+    Preset { name: "ct-skin-bone", about: "CT: bone under translucent skin", points: ct::skin_bone },
+    Preset { name: "ct-lung", about: "CT: airways and lung tissue as a thin cloud", points: ct::lung },
+    Preset { name: "ct-muscle", about: "CT: muscle and organs, fat removed, with bone", points: ct::muscle },
+    Preset {
+        name: "ct-vessels",
+        about: "CT with contrast agent: vessels in red, with bone",
+        points: ct::vessels,
+    },
+    Preset { name: "mri", about: "MRI: soft tissue, darker below and brighter above", points: adaptive::mri },
+    Preset {
+        name: "mri-glass",
+        about: "MRI: translucent, to see what lies inside",
+        points: adaptive::mri_glass,
+    },
+    Preset {
+        name: "solid",
+        about: "any data: all above the background as one solid",
+        points: adaptive::solid,
+    },
+    Preset {
+        name: "cloud",
+        about: "any data: extinction in proportion to the value",
+        points: adaptive::cloud,
+    },
+    Preset {
+        name: "layers",
+        about: "any data: a coloured veil at each quarter of the values",
+        points: adaptive::layers,
+    },
+    Preset { name: "cornell-box", about: "the materials of the procedural Cornell box", points: cornell_box },
+];
+
+impl Preset {
+    /// The preset of that name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<&'static Self> {
+        PRESETS.iter().find(|preset| preset.name == name)
+    }
+
+    /// The preset that suits a volume when nobody chose one.
+    #[must_use]
+    pub fn for_volume(volume: &Volume) -> &'static Self {
+        let [least, most] = volume.value_range();
+        let anatomical = volume.grid().space() == Space::Anatomical;
+        // Air at -1000 and something denser than water: Hounsfield units.
+        let name = if least <= -500.0 && most >= 200.0 && least >= -4100.0 {
+            "ct-bone"
+        } else if adaptive::is_two_phase(&Profile::new(volume)) {
+            "solid"
+        } else if anatomical {
+            "mri"
+        } else {
+            "cloud"
+        };
+        Self::named(name).expect("a preset of this list")
+    }
+
+    /// The points for a volume; at least one, ascending.
+    #[must_use]
+    pub fn points(&self, volume: &Volume) -> Vec<Point> {
+        (self.points)(&Profile::new(volume))
+    }
+}
+
+/// What a preset knows of a volume.
+struct Profile {
+    histogram: Histogram,
+}
+
+/// Fine enough to place a threshold, coarse enough for every bin to mean something.
+const BINS: usize = 256;
+
+impl Profile {
+    fn new(volume: &Volume) -> Self {
+        Self { histogram: volume.histogram(volume.robust_range(), BINS) }
+    }
+
+    /// The value at a share of the robust range.
+    fn at(&self, share: f64) -> f32 {
+        let [lo, hi] = self.histogram.range;
+        cast::single(lo + (hi - lo) * share)
+    }
+}
+
+/// A point of matter that scatters in a colour.
+fn matter(value: f32, opacity: f32, albedo: [f32; 3], surface: f32) -> Point {
+    Point { value, optics: Optics { opacity, albedo: Rgb::from(albedo), surface, ..Optics::default() } }
+}
+
+/// Fig. 4 of [Jonsson12]: white walls with one red and one green, thin bluish air.
+fn cornell_box(_: &Profile) -> Vec<Point> {
+    let looks: [(f32, [f32; 3]); 7] = [
+        (0.0008, [0.80, 0.88, 0.98]),
+        (1.0, [0.85, 0.85, 0.85]),
+        (1.0, [0.80, 0.10, 0.08]),
+        (1.0, [0.12, 0.62, 0.14]),
+        (1.0, [0.90, 0.72, 0.30]),
+        (1.0, [0.85, 0.85, 0.85]),
+        (0.025, [0.90, 0.95, 0.99]),
+    ];
+    // Flat around each value, with jumps half way between neighbours.
+    let sixteenth = 1.0 / 16.0;
+    let flat = |(material, (opacity, albedo)): (&crate::volume::procedural::Material, (f32, [f32; 3]))| {
+        [-1.0, 1.0].map(|side| matter(material.value + side * sixteenth, opacity, albedo, 0.0))
+    };
+    MATERIALS.iter().zip(looks).flat_map(flat).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::transfer::TransferFunction;
+    use crate::volume::procedural::{Field, Kind};
+    use crate::volume::{Grid, ValueMap, Voxels};
+
+    fn volumes() -> Vec<Volume> {
+        let mut all: Vec<Volume> =
+            Kind::ALL.iter().map(|&(kind, _)| Field::new(kind, [20; 3], 1).volume().unwrap()).collect();
+        let grid = || Grid::centred([10, 10, 10], [1.0; 3]).unwrap();
+        let hounsfield = (0..1000).map(|i| i * 3 - 1000).collect();
+        all.push(Volume::new(grid(), Voxels::I16(hounsfield), ValueMap::IDENTITY).unwrap());
+        let sparse = (0..1000).map(|i| if i % 400 == 7 { 1e30 } else { 0.0 }).collect();
+        all.push(Volume::new(grid(), Voxels::F32(sparse), ValueMap::IDENTITY).unwrap());
+        let flat = Grid::centred([1, 1, 1], [1.0; 3]).unwrap();
+        all.push(Volume::new(flat, Voxels::U8(vec![7]), ValueMap::IDENTITY).unwrap());
+        all
+    }
+
+    #[test]
+    fn every_preset_makes_a_function_of_every_volume() {
+        for volume in volumes() {
+            for preset in PRESETS {
+                let points = preset.points(&volume);
+                let range = volume.value_range();
+                TransferFunction::new(points)
+                    .unwrap_or_else(|e| panic!("{} over {range:?}: {e}", preset.name));
+            }
+        }
+    }
+
+    #[test]
+    fn the_automatic_choice_shows_something_of_every_volume() {
+        for volume in volumes() {
+            let preset = Preset::for_volume(&volume);
+            let function = TransferFunction::new(preset.points(&volume)).unwrap();
+            let [lo, hi] = volume.value_range().map(cast::single);
+            assert!(function.opacity_range([lo, hi])[1] > 0.2, "{} over [{lo}, {hi}]", preset.name);
+        }
+        let names = volumes().iter().map(|v| Preset::for_volume(v).name).collect::<Vec<_>>();
+        assert_eq!(names[6], "ct-bone");
+    }
+}
