@@ -12,8 +12,8 @@ const HEAVY: f64 = 2.0;
 /// How often a cell is halved at most; ends the halving where the whole mass sits in a point.
 const MOST_HALVINGS: usize = 24;
 
-/// Error of a cell's share. With a million samples it moves the statistic by 0.1 at most, while the statistic itself
-/// varies by more than 30.
+/// Wanted error of a cell's share. With a million samples it would move the statistic by 0.1, while the statistic
+/// itself varies by 25 and more.
 const RELATIVE_ERROR: f64 = 3e-4;
 
 /// Pieces of a cell's range. A density in single precision is noise at the end, which no number of pieces smooths;

@@ -99,7 +99,7 @@ fn failed_samples_are_a_cell() {
     ChiSquare::default().directions(cosine_by_rejection, |w| share * cosine_pdf(w)).assert();
     let forgotten = ChiSquare::default().directions(cosine_by_rejection, cosine_pdf);
     assert!(matches!(forgotten.fault, Some(Fault::Mass { .. })), "{forgotten}");
-    // Three failures more in a thousand are past the mass check's reach for a few samples, but not past the cell's.
+    // Three failures more in a thousand are within the tolerance of the mass, so only the cell sees them.
     let fails_more = |[a, b, c]: [f32; 3]| if c < 0.003 { None } else { cosine_by_rejection([a, b]) };
     let fit = ChiSquare { rows: 2, columns: 2, ..ChiSquare::default() }
         .directions(fails_more, |w| share * cosine_pdf(w));
