@@ -26,7 +26,7 @@ impl Half {
     }
 }
 
-/// Reflectance of a facet seen at a cosine, from its reflectance at normal incidence [Schlick94, eq. 15].
+/// Reflectance of a facet seen at a cosine, from its reflectance at normal incidence [Schlick94].
 #[inline]
 pub fn fresnel(at_normal: Rgb, cos: f32) -> Rgb {
     let rise = fifth(1.0 - cos);

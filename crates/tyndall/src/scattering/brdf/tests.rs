@@ -67,6 +67,43 @@ fn the_base_reflects_what_it_claims() {
     }
 }
 
+/// Light sent straight back shows the facets' distribution, free of Fresnel's rise, and both integrate to 1 there:
+/// `D cos` of microfacets and the half-vector density of Ashikhmin and Shirley.
+#[test]
+fn light_sent_back_shows_all_facets() {
+    for (brdf, roughness) in all_shapes().into_iter().skip(1) {
+        let surface = grey(0.0, 0.6, roughness);
+        let [facets] = trial::integrate(normal(), |w| {
+            let cos = normal().dot(w);
+            if cos <= 0.0 {
+                return [0.0];
+            }
+            let facets = match brdf {
+                Brdf::Abc(_) => 4.0 * cos * cos / (2.0 * cos * cos).min(1.0) * cos,
+                _ => 4.0 * cos,
+            };
+            [f64::from(brdf.eval(normal(), w, w, &surface).g * facets)]
+        });
+        assert!((facets - 0.6).abs() < 2e-3, "{brdf:?}, roughness {roughness}: {facets}");
+    }
+}
+
+#[test]
+fn ashikhmin_shirley_by_hand() {
+    let brdf = Brdf::AshikhminShirley;
+    let along_normal = brdf.eval(Vec3::Z, Vec3::Z, Vec3::Z, &grey(0.0, 0.4, 0.5)).g;
+    let exponent = 30.0;
+    assert!((along_normal - (exponent + 1.0) / 8.0 * FRAC_1_PI * 0.4).abs() < 1e-6, "{along_normal}");
+    // At roughness 1 the exponent is 0. Half of 120 degrees: k . h = 1/2, F = 0.4 + 0.6 / 32.
+    let w = |side: f32| Vec3::new(side * 0.75_f32.sqrt(), 0.0, 0.5);
+    let across = brdf.eval(Vec3::Z, w(1.0), w(-1.0), &grey(0.0, 0.4, 1.0)).g;
+    assert!((across - FRAC_1_PI / 8.0 * 0.41875 / (0.5 * 0.5)).abs() < 1e-6, "{across}");
+    // The diffuse term alone is left at a specular of 0, beside Fresnel's rise: 0 along the normal.
+    let base = brdf.eval(Vec3::Z, Vec3::Z, Vec3::Z, &grey(0.5, 0.0, 0.5)).g;
+    let expected = 28.0 * 0.5 / 23.0 * FRAC_1_PI * (31.0_f32 / 32.0).powi(2);
+    assert!((base - expected).abs() < 1e-6, "{base}");
+}
+
 #[test]
 fn exchanging_the_directions_changes_nothing() {
     let mut random = SplitMix::new(5);
