@@ -109,6 +109,7 @@ impl ImageError {
                 "free some space or use another disk".to_owned()
             }
             ErrorKind::IsADirectory => "add a file name to it".to_owned(),
+            ErrorKind::InvalidFilename => "give it a shorter name".to_owned(),
             _ => "choose another place".to_owned(),
         };
         Self::Unwritable { path: path.to_owned(), source, mend }

@@ -155,7 +155,7 @@ fn check_size(header: &Header, length: u64) -> Result<(), MapFailure> {
         _ => SHRINKS_LOSSLESS,
     };
     let bytes = (width * height).saturating_mul(header.channels.bytes_per_pixel as u64);
-    if bytes / shrinks > length || header.chunk_count as u64 > length / 8 {
+    if bytes / shrinks > length {
         let found = format!("{length} bytes for {width} x {height} pixels");
         return Err(MapFailure::Malformed(format!(
             "found {found}, expected more: the file is cut off or its header wrong"

@@ -3,6 +3,19 @@
 //! The 8-bit kinds show the picture through a tone curve. OpenEXR is the record: linear float,
 //! premultiplied, with the variance of each pixel's mean and the depth as further layers.
 //! Every written picture carries its [`Metadata`], so that it can be made again.
+//!
+//! ```
+//! use tyndall_formats::image::{Display, Metadata, Picture, read_metadata, write};
+//!
+//! let path = std::env::temp_dir().join("tyndall-doc.exr");
+//! let picture = Picture { width: 1, height: 1, rgba: vec![[0.2, 0.3, 0.4, 1.0]], ..Picture::default() };
+//! let mut metadata = Metadata::default();
+//! metadata.insert(Metadata::SEED, "7");
+//! write(&path, &picture, &Display::default(), &metadata)?;
+//! assert_eq!(read_metadata(&path)?, Some(metadata));
+//! # std::fs::remove_file(&path).ok();
+//! # Ok::<(), tyndall_formats::image::ImageError>(())
+//! ```
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
