@@ -27,63 +27,64 @@ impl Path {
         let (in_pixel, on_lens) = numbers.camera();
         let film = [x as f32 + in_pixel[0], y as f32 + in_pixel[1]];
         let ray = scene.camera.ray(scene.size, film, on_lens);
-        trace(scene, ray, &mut numbers)
+        Self::trace(scene, ray, &mut numbers)
     }
-}
 
-/// Radiance along a camera ray.
-pub(super) fn trace(scene: &Scene, mut ray: Ray, numbers: &mut PathSampler) -> PixelSample {
-    let medium = &*scene.medium;
-    let mut seen = PixelSample::default();
-    let mut throughput = Rgb::WHITE;
-    // Density of the ray's direction; none was drawn for the camera's own ray.
-    let mut pdf = None;
-    for order in 0..=scene.render.max_scatter {
-        let u = numbers.bounce(order);
-        let track = medium.track(&ray, f32::INFINITY);
-        let collision = medium.free_flight(&track, u.flight_depth(), &mut numbers.stream);
-        let reach = collision.map_or(f32::INFINITY, |c| track.distance(c.t));
-        if let Some(pdf) = pdf {
-            seen.radiance += throughput * scene.lights.passed(&ray, reach, pdf);
-        }
-        let Some(collision) = collision else {
-            if order == 0 {
-                seen.radiance += scene.behind(ray.direction);
+    /// An unbiased estimate of the radiance that arrives along a world ray.
+    #[must_use]
+    pub fn trace(scene: &Scene, mut ray: Ray, numbers: &mut PathSampler) -> PixelSample {
+        let medium = &*scene.medium;
+        let mut seen = PixelSample::default();
+        let mut throughput = Rgb::WHITE;
+        // Density of the ray's direction; none was drawn for the camera's own ray.
+        let mut pdf = None;
+        for order in 0..=scene.render.max_scatter {
+            let u = numbers.bounce(order);
+            let track = medium.track(&ray, f32::INFINITY);
+            let collision = medium.free_flight(&track, u.flight_depth(), &mut numbers.stream);
+            let reach = collision.map_or(f32::INFINITY, |c| track.distance(c.t));
+            if let Some(pdf) = pdf {
+                seen.radiance += throughput * scene.lights.passed(&ray, reach, pdf);
             }
-            break;
-        };
-        let optics = medium.optics(collision.place);
-        if order == 0 {
-            seen.alpha = 1.0;
-            seen.depth = reach * ray.direction.dot(scene.camera.view());
-        }
-        let emitted = Medium::emitted(&optics);
-        if !emitted.is_black() {
-            let sigma_t = medium.density() * optics.opacity;
-            let weight = pdf
-                .map_or(1.0, |pdf| scene.lights.flight_weight(medium, collision.place, sigma_t, reach, pdf));
-            seen.radiance += throughput * emitted * weight;
-        }
-        if order == scene.render.max_scatter {
-            break;
-        }
-        let event = medium.event(collision.place, &optics);
-        let here = medium.volume().grid().index_to_world(collision.place);
-        seen.radiance += throughput * direct(scene, &event, here, -ray.direction, &u, numbers);
-        let Some(scattered) = event.sample(-ray.direction, u.scatter) else { break };
-        throughput *= scattered.weight;
-        let brightest = throughput.max_component();
-        if brightest < ROULETTE_WEIGHT {
-            let survival = brightest / ROULETTE_WEIGHT;
-            if u.roulette >= survival {
+            let Some(collision) = collision else {
+                if order == 0 {
+                    seen.radiance += scene.behind(ray.direction);
+                }
+                break;
+            };
+            let optics = medium.optics(collision.place);
+            if order == 0 {
+                seen.alpha = 1.0;
+                seen.depth = reach * ray.direction.dot(scene.camera.view());
+            }
+            let emitted = Medium::emitted(&optics);
+            if !emitted.is_black() {
+                let sigma_t = medium.density() * optics.opacity;
+                let weight =
+                    pdf.map_or(1.0, |pdf| scene.lights.flight_weight(collision.place, sigma_t, reach, pdf));
+                seen.radiance += throughput * emitted * weight;
+            }
+            if order == scene.render.max_scatter {
                 break;
             }
-            throughput /= survival;
+            let event = medium.event(collision.place, &optics);
+            let here = medium.volume().grid().index_to_world(collision.place);
+            seen.radiance += throughput * direct(scene, &event, here, -ray.direction, &u, numbers);
+            let Some(scattered) = event.sample(-ray.direction, u.scatter) else { break };
+            throughput *= scattered.weight;
+            let brightest = throughput.max_component();
+            if brightest < ROULETTE_WEIGHT {
+                let survival = brightest / ROULETTE_WEIGHT;
+                if u.roulette >= survival {
+                    break;
+                }
+                throughput /= survival;
+            }
+            ray = Ray::new(here, scattered.direction);
+            pdf = Some(scattered.pdf);
         }
-        ray = Ray::new(here, scattered.direction);
-        pdf = Some(scattered.pdf);
+        seen
     }
-    seen
 }
 
 /// Next-event estimation: what one light, drawn by power, sends to a point and on to `w_out`.

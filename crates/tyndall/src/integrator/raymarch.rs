@@ -43,7 +43,9 @@ impl RayMarch {
         self.march(scene, &ray)
     }
 
-    fn march(&self, scene: &Scene, ray: &Ray) -> PixelSample {
+    /// The radiance that arrives along a world ray.
+    #[must_use]
+    pub fn march(&self, scene: &Scene, ray: &Ray) -> PixelSample {
         let medium = &*scene.medium;
         let track = medium.track(ray, f32::INFINITY);
         let along_view = ray.direction.dot(scene.camera.view());

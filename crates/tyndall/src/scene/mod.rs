@@ -1,8 +1,13 @@
 //! A scene: everything that decides a picture, as one immutable value, cheap to clone.
 
+mod build;
+pub mod document;
+
+pub use build::{Assets, SceneError};
+
 use crate::camera::Camera;
 use crate::light::LightSet;
-use crate::math::Rgb;
+use crate::math::{Rgb, Vec3};
 use crate::medium::Medium;
 use std::sync::Arc;
 
@@ -71,9 +76,9 @@ impl IntegratorKind {
 }
 
 impl Scene {
-    /// Radiance and alpha of a camera ray that meets nothing.
+    /// Radiance of a camera ray that meets nothing.
     #[must_use]
-    pub fn behind(&self, direction: crate::math::Vec3) -> Rgb {
+    pub fn behind(&self, direction: Vec3) -> Rgb {
         match self.background {
             Background::Environment => self.lights.sky(direction),
             Background::Transparent => Rgb::BLACK,

@@ -1,0 +1,244 @@
+//! From the checked document to the scene: what was left to choice is chosen here, by the volume.
+
+use super::document::{self, Document};
+use super::{Background, IntegratorKind, RenderSettings, Scene};
+use crate::camera::{AutoView, Camera, FitLens, Lens, fit};
+use crate::light::{Directional, Disk, Environment, Light, LightSet, Map, PointLight, Rect, SphereLight};
+use crate::math::{Bounds, Rgb, Vec3};
+use crate::medium::{ClipShape, Medium, MediumSettings};
+use crate::scattering::{Abc, Brdf, HenyeyGreenstein, Phase, Schlick};
+use crate::transfer::{Optics, PRESETS, Point, Preset, TransferFunction};
+use crate::volume::{Space, Volume};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// What a document names but does not hold.
+#[derive(Clone, Debug)]
+pub struct Assets {
+    /// The volume, read as the document says.
+    pub volume: Arc<Volume>,
+    /// Environment maps by the path that the document gives.
+    pub maps: BTreeMap<String, Arc<Map>>,
+}
+
+/// Why a document with its assets makes no scene.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("`{path}`: {problem}")]
+pub struct SceneError {
+    /// Where in the document.
+    pub path: String,
+    /// What was found, what was expected, and the mend.
+    pub problem: String,
+}
+
+fn fault(path: impl Into<String>, problem: impl ToString) -> SceneError {
+    SceneError { path: path.into(), problem: problem.to_string() }
+}
+
+impl Scene {
+    /// Builds the scene of a document, in parallel on the current thread pool.
+    ///
+    /// # Errors
+    /// [`SceneError`] for what only shows beside the volume: a preset that is not there, a view
+    /// without a frame, a map that was not given.
+    pub fn build(document: &Document, assets: &Assets) -> Result<Self, SceneError> {
+        let volume = &assets.volume;
+        let transfer = Arc::new(transfer(document, volume)?);
+        let medium = Medium::new(volume.clone(), transfer, &medium_settings(document)?);
+        let up = volume.grid().space().up();
+        let lights = match &document.lights {
+            None => default_lights(volume.grid().space()),
+            Some(lights) => lights
+                .iter()
+                .enumerate()
+                .map(|(i, l)| light(l, up, assets).map_err(|e| fault(format!("lights.{i}"), e)))
+                .collect::<Result<_, _>>()?,
+        };
+        Ok(Self {
+            lights: Arc::new(LightSet::new(lights, &medium)),
+            medium: Arc::new(medium),
+            camera: camera(document, volume)?,
+            size: document.film.size,
+            background: background(document),
+            render: render_settings(document),
+        })
+    }
+}
+
+fn transfer(document: &Document, volume: &Volume) -> Result<TransferFunction, SceneError> {
+    let given = document.transfer_function.as_ref();
+    let points = if let Some(points) = given.and_then(|t| t.points.as_ref()) {
+        points.iter().map(point).collect()
+    } else if let Some(name) = given.and_then(|t| t.preset.as_ref()) {
+        let preset = Preset::named(name).ok_or_else(|| {
+            let known = PRESETS.map(|p| p.name).join(", ");
+            fault("transfer_function.preset", format!("no preset `{name}`; there are {known}"))
+        })?;
+        preset.points(volume)
+    } else {
+        Preset::for_volume(volume).points(volume)
+    };
+    TransferFunction::new(points).map_err(|e| fault("transfer_function.points", e))
+}
+
+fn point(p: &document::TransferPoint) -> Point {
+    let optics = Optics {
+        opacity: p.opacity,
+        albedo: p.albedo.into(),
+        emission: p.emission.into(),
+        surface: p.surface,
+        specular: p.specular.into(),
+        roughness: p.roughness,
+        ior: p.ior,
+    };
+    Point { value: p.value, optics }
+}
+
+fn medium_settings(document: &Document) -> Result<MediumSettings, SceneError> {
+    let phase = match document.medium.phase {
+        document::Phase::Isotropic => Phase::Isotropic,
+        document::Phase::HenyeyGreenstein { g } => {
+            Phase::HenyeyGreenstein(HenyeyGreenstein::new(g).map_err(|e| fault("medium.phase.g", e))?)
+        }
+        document::Phase::Schlick { k } => {
+            Phase::Schlick(Schlick::new(k).map_err(|e| fault("medium.phase.k", e))?)
+        }
+    };
+    let brdf = match document.medium.brdf {
+        document::Brdf::Lambert => Brdf::Lambert,
+        document::Brdf::AshikhminShirley => Brdf::AshikhminShirley,
+        document::Brdf::Abc { b, c } => Brdf::Abc(Abc::new(b, c).map_err(|e| fault("medium.brdf", e))?),
+    };
+    let clip = document.clip.iter().map(|clip| match *clip {
+        document::Clip::Plane { point, normal, .. } => {
+            ClipShape::Plane { point: point.into(), normal: normal.into() }
+        }
+        document::Clip::Box { min, max, .. } => ClipShape::Box(Bounds::new(min.into(), max.into())),
+    });
+    Ok(MediumSettings {
+        density: document.medium.density,
+        phase,
+        brdf,
+        gradient_factor: document.medium.gradient_factor,
+        clip: clip.collect(),
+        majorant_cell: document.render.path.majorant_cell as usize,
+    })
+}
+
+fn light(light: &document::Light, world_up: Vec3, assets: &Assets) -> Result<Light, String> {
+    let vector = Vec3::from_array;
+    Ok(match light {
+        document::Light::Directional { direction, irradiance, angle, .. } => {
+            Light::Directional(Directional::new(vector(*direction), Rgb::from(*irradiance), *angle))
+        }
+        document::Light::Point { position, intensity, .. } => {
+            Light::Point(PointLight { position: vector(*position), intensity: Rgb::from(*intensity) })
+        }
+        document::Light::Rect { position, target, up, size, radiance, .. } => {
+            let facing = vector(*target) - vector(*position);
+            let up = up.map_or(world_up, vector);
+            Light::Rect(Rect::new(vector(*position), facing, up, *size, Rgb::from(*radiance)))
+        }
+        document::Light::Disk { position, target, radius, radiance, .. } => {
+            let facing = vector(*target) - vector(*position);
+            Light::Disk(Disk::new(vector(*position), facing, *radius, Rgb::from(*radiance)))
+        }
+        document::Light::Sphere { position, radius, radiance, .. } => Light::Sphere(SphereLight {
+            middle: vector(*position),
+            radius: *radius,
+            radiance: Rgb::from(*radiance),
+        }),
+        document::Light::Environment { radiance, map, rotation, visible, .. } => {
+            Light::Environment(match (radiance, map) {
+                (_, Some(path)) => {
+                    let map = assets.maps.get(path).ok_or_else(|| format!("the map `{path}` is missing"))?;
+                    Environment::map(map.clone(), world_up, *rotation, *visible)
+                }
+                (radiance, None) => Environment::constant(radiance.map_or(Rgb::BLACK, Rgb::from), *visible),
+            })
+        }
+    })
+}
+
+/// Lights that show form: a warm soft sun from the upper left of the front, a cool sky that fills.
+fn default_lights(space: Space) -> Vec<Light> {
+    let (up, front) = match space {
+        Space::Anatomical => (Vec3::Z, -Vec3::Y),
+        Space::Plain => (Vec3::Y, Vec3::Z),
+    };
+    let right = up.cross(front);
+    let travel = right * 0.7 - up * 0.8 - front * 0.6;
+    let sun = Directional::new(travel, Rgb::new(3.2, 3.0, 2.7), 12.0);
+    let sky = Environment::constant(Rgb::new(0.33, 0.36, 0.40), true);
+    vec![Light::Directional(sun), Light::Environment(sky)]
+}
+
+fn camera(document: &Document, volume: &Volume) -> Result<Camera, SceneError> {
+    let grid = volume.grid();
+    let given = document.camera.clone().unwrap_or_default();
+    let up = given.up().map(Vec3::from_array);
+    let Some(position) = given.position().map(Vec3::from_array) else {
+        let auto = given.auto();
+        let usual = AutoView::default_for(grid.space());
+        let view = AutoView {
+            azimuth: auto.azimuth.unwrap_or(usual.azimuth),
+            elevation: auto.elevation.unwrap_or(usual.elevation),
+            zoom: auto.zoom,
+        };
+        let lens = match given {
+            document::Camera::Perspective { fov, aperture, focus, .. } => {
+                FitLens::Perspective { fov, aperture, focus }
+            }
+            document::Camera::Orthographic { height, .. } => FitLens::Orthographic { height },
+        };
+        return Ok(fit(grid, view, up, lens, document.film.size));
+    };
+    let target = given.target().map_or_else(|| grid.world_bounds().center(), Vec3::from_array);
+    let view = target - position;
+    if view.length() <= 1e-6 * (1.0 + position.length()) {
+        let problem = format!("{position} is the target; expected two places: move one of them");
+        return Err(fault("camera.position", problem));
+    }
+    let up = up.unwrap_or_else(|| {
+        let up = grid.space().up();
+        // Looking straight along the world's up, any upright picture will do.
+        if up.cross(view).length() > 1e-3 * view.length() {
+            up
+        } else {
+            Vec3::new(up.z, 0.0, -up.y).cross(up)
+        }
+    });
+    if up.cross(view).length() <= 1e-6 * up.length() * view.length() {
+        let problem = format!("{up} lies along the view {view}; expected another direction");
+        return Err(fault("camera.up", problem));
+    }
+    let lens = match given {
+        document::Camera::Perspective { fov, aperture, focus, .. } => {
+            Lens::Perspective { fov, aperture, focus: focus.unwrap_or_else(|| view.length()) }
+        }
+        document::Camera::Orthographic { height, .. } => {
+            Lens::Orthographic { height: height.unwrap_or_else(|| grid.diagonal()) }
+        }
+    };
+    Ok(Camera::new(position, target, up, lens))
+}
+
+fn background(document: &Document) -> Background {
+    match document.film.background {
+        document::Background::Environment => Background::Environment,
+        document::Background::Transparent => Background::Transparent,
+        document::Background::Color(color) => Background::Color(color.into()),
+    }
+}
+
+fn render_settings(document: &Document) -> RenderSettings {
+    let render = &document.render;
+    let integrator = match render.integrator {
+        document::Integrator::Raymarch => IntegratorKind::RayMarch {
+            step: render.raymarch.step,
+            light_samples: render.raymarch.light_samples,
+        },
+        document::Integrator::Path => IntegratorKind::Path,
+    };
+    RenderSettings { integrator, max_scatter: render.max_scatter, seed: render.seed }
+}

@@ -1,0 +1,135 @@
+//! Lights: sources only, invisible to the camera unless they are a visible environment.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::shape::{Color, ConeAngle, Positive, Vector};
+
+/// A light. It blocks nothing and casts no shadow, and may lie inside the volume.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Light {
+    /// Light from far away, like the sun.
+    Directional {
+        /// Name by which edits find the light.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        /// Direction in which the light travels; any length but 0.
+        #[schemars(with = "Vector")]
+        direction: [f32; 3],
+        /// Irradiance of a surface that faces the light, in W m^-2.
+        #[schemars(with = "Color")]
+        irradiance: [f32; 3],
+        /// Full angle of the cone that the light comes from, in degrees; 0 is sharp.
+        #[serde(default)]
+        #[schemars(with = "ConeAngle")]
+        angle: f32,
+    },
+    /// A point that shines equally into all directions.
+    Point {
+        /// Name by which edits find the light.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        /// Place of the light, in world units.
+        #[schemars(with = "Vector")]
+        position: [f32; 3],
+        /// Radiant intensity, in W sr^-1.
+        #[schemars(with = "Color")]
+        intensity: [f32; 3],
+    },
+    /// A rectangle that shines from the side of its target.
+    Rect {
+        /// Name by which edits find the light.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        /// Centre, in world units.
+        #[schemars(with = "Vector")]
+        position: [f32; 3],
+        /// Point that the light faces.
+        #[schemars(with = "Vector")]
+        target: [f32; 3],
+        /// Direction that is up on the rectangle: its height runs along it; when omitted, the world's up.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(with = "Option<Vector>")]
+        up: Option<[f32; 3]>,
+        /// Width and height, in world units.
+        #[schemars(with = "[Positive; 2]")]
+        size: [f32; 2],
+        /// Emitted radiance, in W m^-2 sr^-1.
+        #[schemars(with = "Color")]
+        radiance: [f32; 3],
+    },
+    /// A disk that shines from the side of its target.
+    Disk {
+        /// Name by which edits find the light.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        /// Centre, in world units.
+        #[schemars(with = "Vector")]
+        position: [f32; 3],
+        /// Point that the light faces.
+        #[schemars(with = "Vector")]
+        target: [f32; 3],
+        /// Radius, in world units.
+        #[schemars(with = "Positive")]
+        radius: f32,
+        /// Emitted radiance, in W m^-2 sr^-1.
+        #[schemars(with = "Color")]
+        radiance: [f32; 3],
+    },
+    /// A sphere that shines outwards.
+    Sphere {
+        /// Name by which edits find the light.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        /// Centre, in world units.
+        #[schemars(with = "Vector")]
+        position: [f32; 3],
+        /// Radius, in world units.
+        #[schemars(with = "Positive")]
+        radius: f32,
+        /// Emitted radiance, in W m^-2 sr^-1.
+        #[schemars(with = "Color")]
+        radiance: [f32; 3],
+    },
+    /// Light from all around: one `radiance`, or a `map`; exactly one of them.
+    #[schemars(extend("oneOf" = [{ "required": ["radiance"] }, { "required": ["map"] }]))]
+    Environment {
+        /// Name by which edits find the light.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        name: Option<String>,
+        /// Radiance from everywhere, in W m^-2 sr^-1.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(with = "Option<Color>")]
+        radiance: Option<[f32; 3]>,
+        /// Picture of the surroundings in latitude and longitude, relative to the document; OpenEXR or Radiance HDR.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(length(min = 1))]
+        map: Option<String>,
+        /// Turn of the surroundings about the world's up, in degrees.
+        #[serde(default)]
+        rotation: f32,
+        /// Whether the camera sees the environment; otherwise it shows black.
+        #[serde(default = "yes")]
+        visible: bool,
+    },
+}
+
+impl Light {
+    /// The name by which edits find the light.
+    #[must_use]
+    pub fn name(&self) -> Option<&str> {
+        match self {
+            Self::Directional { name, .. }
+            | Self::Point { name, .. }
+            | Self::Rect { name, .. }
+            | Self::Disk { name, .. }
+            | Self::Sphere { name, .. }
+            | Self::Environment { name, .. } => name.as_deref(),
+        }
+    }
+}
+
+fn yes() -> bool {
+    true
+}

@@ -1,0 +1,98 @@
+//! The transfer function: from data values to optical quantities.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::shape::{Color, Fraction, FractionColor, Positive};
+
+/// What each data value looks like: a named `preset`, or `points`; without either, a preset fit to the volume's kind.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(extend("not" = { "required": ["preset", "points"] }))]
+pub struct TransferFunction {
+    /// Name of a preset, as `tyndall presets` lists them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
+    pub preset: Option<String>,
+
+    /// Points of a function that is piecewise linear in the data value and clamped outside; values ascend.
+    /// Two points at one value are a jump, of which the later holds from there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
+    pub points: Option<Vec<TransferPoint>>,
+}
+
+/// The optical quantities at one data value.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TransferPoint {
+    /// Data value, in the file's meaning (CT: Hounsfield units).
+    pub value: f32,
+
+    /// Share of `medium.density` that is the extinction here, from 0 to 1; not alpha per step.
+    #[schemars(with = "Fraction")]
+    pub opacity: f32,
+
+    /// Scattered share of the extinction, per colour channel.
+    #[serde(default = "default_albedo")]
+    #[schemars(with = "FractionColor")]
+    pub albedo: [f32; 3],
+
+    /// Emitted radiance Le, in W m^-2 sr^-1; matter adds sigma_a Le per unit length.
+    #[serde(default)]
+    #[schemars(with = "Color")]
+    pub emission: [f32; 3],
+
+    /// How far matter with a gradient acts as a surface (`medium.brdf`) instead of a cloud (`medium.phase`).
+    #[serde(default)]
+    #[schemars(with = "Fraction")]
+    pub surface: f32,
+
+    /// Reflectance of the surface at normal incidence, per colour channel.
+    #[serde(default = "default_specular")]
+    #[schemars(with = "FractionColor")]
+    pub specular: [f32; 3],
+
+    /// Roughness of the surface: 0 is a mirror, 1 is dull.
+    #[serde(default = "default_roughness")]
+    #[schemars(with = "Fraction")]
+    pub roughness: f32,
+
+    /// Refractive index; 1 is vacuum.
+    #[serde(default = "vacuum")]
+    #[schemars(with = "Positive")]
+    pub ior: f32,
+}
+
+impl TransferPoint {
+    /// A point whose other quantities stand at their defaults.
+    #[must_use]
+    pub fn new(value: f32, opacity: f32) -> Self {
+        Self {
+            value,
+            opacity,
+            albedo: default_albedo(),
+            emission: [0.0; 3],
+            surface: 0.0,
+            specular: default_specular(),
+            roughness: default_roughness(),
+            ior: vacuum(),
+        }
+    }
+}
+
+fn default_albedo() -> [f32; 3] {
+    [0.8; 3]
+}
+
+fn default_specular() -> [f32; 3] {
+    [0.04; 3]
+}
+
+fn default_roughness() -> f32 {
+    0.3
+}
+
+fn vacuum() -> f32 {
+    1.0
+}

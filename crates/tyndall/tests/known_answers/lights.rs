@@ -1,0 +1,117 @@
+//! Lights: samplers against their densities, irradiances against closed forms.
+
+use crate::scenes::mean;
+use std::f64::consts::PI;
+use std::sync::Arc;
+use tyndall::light::{Directional, Disk, Environment, Light, Map, PointLight, Rect, SphereLight};
+use tyndall::math::{Ray, Rgb, Vec3};
+use tyndall_testing::ChiSquare;
+
+fn lights_with_an_extent() -> Vec<(&'static str, Light)> {
+    let at = Vec3::new(0.4, 1.2, -0.5);
+    let texels =
+        (0..32 * 16).map(|i| Rgb::splat(if i % 37 == 0 { 9.0 } else { (i % 5) as f32 * 0.1 })).collect();
+    let map = Arc::new(Map::new(32, 16, texels).unwrap());
+    vec![
+        ("sun", Light::Directional(Directional::new(Vec3::new(0.3, -1.0, 0.2), Rgb::WHITE, 50.0))),
+        ("rect", Light::Rect(Rect::new(at, -at, Vec3::X, [1.0, 0.5], Rgb::WHITE))),
+        ("disk", Light::Disk(Disk::new(at, Vec3::new(-0.2, -1.0, 0.1), 0.7, Rgb::WHITE))),
+        ("sphere", Light::Sphere(SphereLight { middle: at, radius: 0.6, radiance: Rgb::WHITE })),
+        ("sky", Light::Environment(Environment::constant(Rgb::WHITE, true))),
+        ("map", Light::Environment(Environment::map(map, Vec3::Z, 30.0, true))),
+    ]
+}
+
+/// Directions follow the density that [`Light::passed`] gives, which is also the sample's own.
+#[test]
+fn directions_follow_their_density() {
+    let from = Vec3::new(0.1, 0.0, 0.2);
+    let lights = lights_with_an_extent();
+    for (name, light) in &lights {
+        let sample = |u: [f32; 2]| {
+            let s = light.sample(from, u)?;
+            let passed = light.passed(&Ray::new(from, s.direction));
+            if let Some(passed) = passed {
+                assert!((passed.pdf / s.pdf - 1.0).abs() < 2e-2, "{name}: {} and {}", passed.pdf, s.pdf);
+            }
+            Some(s.direction.to_array())
+        };
+        let pdf = |w: [f32; 3]| {
+            light.passed(&Ray::new(from, Vec3::from_array(w))).map_or(0.0, |p| f64::from(p.pdf))
+        };
+        let fit = ChiSquare { rows: 32, columns: 64, ..ChiSquare::of(lights.len()) }.directions(sample, pdf);
+        assert!(fit.passes(), "{name}: {fit}");
+    }
+}
+
+/// Irradiance of a surface at the origin that faces +z.
+fn irradiance(light: &Light, normal: Vec3, paths: u32) -> tyndall_testing::Mean {
+    mean(5, paths, |_, s| {
+        let sample = light.sample(Vec3::ZERO, [s.uniform(), s.uniform()]);
+        sample.map_or(0.0, |l| f64::from(l.radiance.g * l.direction.dot(normal).max(0.0)))
+    })
+}
+
+#[test]
+fn irradiances_have_closed_forms() {
+    let up = Vec3::Z;
+    let check = |light: Light, expected: f64| {
+        irradiance(&light, up, 1_000_000).against(expected).assert_within(3.5, 2e-3);
+    };
+    // A facing disk: L pi r^2 / (r^2 + d^2). A sphere: L pi (r/d)^2 cos, whole above the horizon.
+    let d = 2.0;
+    check(Light::Disk(Disk::new(up * d, -up, 1.5, Rgb::splat(3.0))), 3.0 * PI * 2.25 / (2.25 + 4.0));
+    let middle = Vec3::new(2.0, 0.0, 2.0);
+    let sphere = SphereLight { middle, radius: 1.0, radiance: Rgb::splat(3.0) };
+    check(Light::Sphere(sphere), 3.0 * PI / 8.0 * 0.5_f64.sqrt());
+    check(Light::Point(PointLight { position: middle, intensity: Rgb::splat(8.0) }), 0.5_f64.sqrt());
+    let slanted = Vec3::new(1.0, 0.0, -1.0);
+    check(Light::Directional(Directional::new(slanted, Rgb::splat(2.0), 0.0)), 2.0 * 0.5_f64.sqrt());
+    // A cone whole above the horizon gives the sharp light's irradiance, whatever its angle.
+    check(Light::Directional(Directional::new(-up, Rgb::splat(2.0), 60.0)), 2.0);
+    check(Light::Environment(Environment::constant(Rgb::splat(0.7), true)), 0.7 * PI);
+    // A facing square: 4 F of its corner quarter, F = 2/pi a/sqrt(1+a^2) atan(b/sqrt(1+a^2)) with a = b.
+    let a = 0.5_f64;
+    let quarter = a / (1.0 + a * a).sqrt() * (a / (1.0 + a * a).sqrt()).atan() / PI;
+    check(
+        Light::Rect(Rect::new(up * 2.0, -up, Vec3::Y, [2.0, 2.0], Rgb::splat(3.0))),
+        3.0 * PI * 4.0 * quarter,
+    );
+}
+
+#[test]
+fn dark_sides_stay_dark() {
+    let up = Vec3::Z;
+    let behind = [
+        Light::Rect(Rect::new(up, up, Vec3::Y, [1.0, 1.0], Rgb::WHITE)),
+        Light::Disk(Disk::new(up, up, 1.0, Rgb::WHITE)),
+        Light::Sphere(SphereLight { middle: Vec3::ZERO, radius: 1.0, radiance: Rgb::WHITE }),
+    ];
+    for light in behind {
+        assert!(light.sample(Vec3::new(0.1, 0.0, 0.0), [0.3, 0.6]).is_none(), "{light:?}");
+        assert!(light.passed(&Ray::new(Vec3::new(0.1, 0.0, 0.0), up)).is_none(), "{light:?}");
+    }
+}
+
+/// A bright texel is where the convention says: the middle column ahead, the right half to the right.
+#[test]
+fn a_map_lies_as_documented() {
+    let texel_at = |x: usize, y: usize| {
+        let texels =
+            (0..64 * 32).map(|i| if i == y * 64 + x { Rgb::splat(100.0) } else { Rgb::BLACK }).collect();
+        Arc::new(Map::new(64, 32, texels).unwrap())
+    };
+    let brightest = |map, up: Vec3, rotation| {
+        let sky = Light::Environment(Environment::map(map, up, rotation, true));
+        sky.sample(Vec3::ZERO, [0.5, 0.5]).unwrap().direction
+    };
+    let near = |found: Vec3, expected: Vec3| {
+        assert!(found.dot(expected.normalize()) > 0.98, "{found}, expected {expected}");
+    };
+    near(brightest(texel_at(32, 16), Vec3::Y, 0.0), -Vec3::Z);
+    near(brightest(texel_at(48, 16), Vec3::Y, 0.0), Vec3::X);
+    near(brightest(texel_at(32, 0), Vec3::Y, 0.0), Vec3::Y);
+    near(brightest(texel_at(32, 16), Vec3::Y, 90.0), -Vec3::X);
+    near(brightest(texel_at(32, 16), Vec3::Z, 0.0), Vec3::Y);
+    near(brightest(texel_at(48, 16), Vec3::Z, 0.0), Vec3::X);
+}

@@ -1,0 +1,74 @@
+//! Single scattering in a slab by its closed form: `raymarch`, and `path` with one scattering.
+
+use crate::scenes::{henyey_greenstein, radiance, slab};
+use std::f64::consts::PI;
+use tyndall::integrator::RayMarch;
+use tyndall::light::{Directional, Light};
+use tyndall::math::{Ray, Rgb, Vec3};
+use tyndall::scene::Scene;
+
+struct Case {
+    thickness: f32,
+    albedo: f32,
+    g: f32,
+    mu_in: f64,
+    mu_out: f64,
+}
+
+const CASES: [Case; 3] = [
+    Case { thickness: 0.3, albedo: 0.7, g: 0.0, mu_in: 1.0, mu_out: 0.6 },
+    Case { thickness: 2.0, albedo: 0.9, g: 0.6, mu_in: 0.5, mu_out: 0.9 },
+    Case { thickness: 6.0, albedo: 1.0, g: -0.3, mu_in: 0.7, mu_out: 0.7 },
+];
+
+impl Case {
+    fn scene(&self) -> Scene {
+        let mut setup = slab(self.thickness, self.albedo, henyey_greenstein(self.g));
+        let (sin, cos) = ((1.0 - self.mu_in * self.mu_in).sqrt() as f32, self.mu_in as f32);
+        let travels = Vec3::new(sin, 0.0, -cos);
+        setup.lights = vec![Light::Directional(Directional::new(travels, Rgb::WHITE, 0.0))];
+        setup.max_scatter = 1;
+        setup.scene()
+    }
+
+    fn ray(&self) -> Ray {
+        let out = Vec3::new(0.0, (1.0 - self.mu_out * self.mu_out).sqrt() as f32, self.mu_out as f32);
+        Ray::new(Vec3::Z * 0.5 + out, -out)
+    }
+
+    /// `albedo p mu0 / (mu + mu0) (1 - exp(-b (1/mu + 1/mu0)))` for unit irradiance.
+    fn expected(&self) -> f64 {
+        let (mu, mu0, b) = (self.mu_out, self.mu_in, f64::from(self.thickness));
+        let cos = -mu * mu0;
+        let g = f64::from(self.g);
+        let phase = (1.0 - g * g) / (4.0 * PI * (1.0 + g * g - 2.0 * g * cos).powf(1.5));
+        f64::from(self.albedo) * phase * mu0 / (mu + mu0) * (1.0 - (-b * (1.0 / mu + 1.0 / mu0)).exp())
+    }
+}
+
+#[test]
+fn path_with_one_scattering() {
+    for case in &CASES {
+        let scene = case.scene();
+        radiance(&scene, 2_000_000, |_| case.ray()).against(case.expected()).assert_within(3.0, 1e-3);
+    }
+}
+
+/// The error of the midpoint rule falls with the square of the step. The slab is one voxel thick, so a
+/// step of 1/64 is some hundredths of optical thickness.
+#[test]
+fn raymarch_and_the_order_of_its_step_error() {
+    // The slab's voxel is wide: steps count in its cube root.
+    let voxel = 1e5_f64.powf(2.0 / 3.0);
+    for case in &CASES {
+        let scene = case.scene();
+        let error = |steps: f64| {
+            let march = RayMarch::new(&scene, (1.0 / (steps * voxel)) as f32, 1);
+            f64::from(march.march(&scene, &case.ray()).radiance.g) / case.expected() - 1.0
+        };
+        let (coarse, fine) = (error(32.0), error(256.0));
+        // 8 times finer: about 64 times nearer, and single precision adds some last places.
+        assert!(fine.abs() < coarse.abs() / 30.0 + 2e-5, "error {coarse:e} at 1/32, {fine:e} at 1/256");
+        assert!(coarse.abs() < 0.02 && coarse.abs() > 1e-6, "error {coarse:e} at 1/32");
+    }
+}
