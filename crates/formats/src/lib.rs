@@ -1,3 +1,7 @@
 //! Reads volumes and maps, writes pictures.
 
+pub mod assets;
+pub mod atomic;
 pub mod image;
+pub mod memory;
+pub mod volume;

@@ -2,7 +2,7 @@
 
 use crate::film::{Film, Image};
 use crate::integrator::Integrator;
-use crate::scene::Scene;
+use crate::scene::{IntegratorKind, Scene};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -38,8 +38,6 @@ pub struct Progress {
     pub samples: u32,
     /// Samples per pixel on average.
     pub mean_samples: f64,
-    /// [`Film::relative_error`].
-    pub relative_error: Option<f64>,
 }
 
 /// Renders a scene on threads of its own.
@@ -98,10 +96,16 @@ impl Session {
     /// How far it is.
     #[must_use]
     pub fn progress(&self) -> Progress {
-        Progress {
-            samples: self.film.samples(),
-            mean_samples: self.film.mean_samples(),
-            relative_error: self.film.relative_error(),
+        Progress { samples: self.film.samples(), mean_samples: self.film.mean_samples() }
+    }
+
+    /// Noise of the picture so far, see [`Film::relative_error`]; `None` for a method without any, whose
+    /// samples differ only by the pixel filter. Costs a walk over all pixels.
+    #[must_use]
+    pub fn relative_error(&self) -> Option<f64> {
+        match self.scene.render.integrator {
+            IntegratorKind::RayMarch { .. } => None,
+            IntegratorKind::Path => self.film.relative_error(),
         }
     }
 }

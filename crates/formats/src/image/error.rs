@@ -98,7 +98,7 @@ impl ImageError {
     }
 
     pub(super) fn unwritable(path: &Path, source: Error) -> Self {
-        let folder = folder_of(path);
+        let folder = crate::atomic::folder_of(path);
         let mend = match source.kind() {
             ErrorKind::NotFound => format!("create the folder {} first", folder.display()),
             ErrorKind::NotADirectory => format!("choose another place: {} is no folder", folder.display()),
@@ -127,11 +127,6 @@ impl ImageError {
     pub(super) fn malformed(path: &Path, kind: &'static str, reason: String) -> Self {
         Self::Malformed { path: path.to_owned(), kind, reason }
     }
-}
-
-/// The folder that a file lies in.
-pub(super) fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Why an encoder gave up, before the file is known.

@@ -21,9 +21,9 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
+use crate::atomic;
 use tyndall::film::tone::ToneCurve;
 
-mod atomic;
 mod display;
 mod error;
 mod exr;
@@ -37,6 +37,9 @@ mod tiff;
 pub use error::ImageError;
 pub use map::{Map, read_map};
 pub use metadata::Metadata;
+
+/// The kinds of picture, for messages.
+const EXTENSIONS: &str = ".png, .jpg, .jpeg, .tif, .tiff or .exr";
 
 /// A finished picture: rows from the top, each from the left.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -97,10 +100,22 @@ pub fn write(
         Some(Kind::Jpeg) => jpeg::encode(picture, display, metadata),
         Some(Kind::Tiff) => tiff::encode(picture, display, metadata),
         Some(Kind::Exr) => exr::encode(picture, metadata),
-        None => return Err(ImageError::extension(path, ".png, .jpg, .jpeg, .tif, .tiff or .exr")),
+        None => return Err(ImageError::extension(path, EXTENSIONS)),
     };
     let bytes = bytes.map_err(|failure| failure.at(path))?;
     atomic::replace(path, &bytes).map_err(|source| ImageError::unwritable(path, source))
+}
+
+/// Tells before a long render whether [`write`] could put a picture there: the kind is known, the folder
+/// is there and takes files, and nothing but a file stands in the place.
+///
+/// # Errors
+/// As [`write`].
+pub fn check_destination(path: &Path) -> Result<(), ImageError> {
+    if Kind::of_extension(path).is_none() {
+        return Err(ImageError::extension(path, EXTENSIONS));
+    }
+    atomic::check(path).map_err(|source| ImageError::unwritable(path, source))
 }
 
 /// The bytes of a PNG file, for a pipe.

@@ -4,12 +4,13 @@ use super::document::{self, Document};
 use super::{Background, IntegratorKind, RenderSettings, Scene};
 use crate::camera::{AutoView, Camera, FitLens, Lens, fit};
 use crate::light::{Directional, Disk, Environment, Light, LightSet, Map, PointLight, Rect, SphereLight};
-use crate::math::{Bounds, Rgb, Vec3};
+use crate::math::{Bounds, Frame, Rgb, Vec3};
 use crate::medium::{ClipShape, Medium, MediumSettings};
 use crate::scattering::{Abc, Brdf, HenyeyGreenstein, Phase, Schlick};
 use crate::transfer::{Optics, PRESETS, Point, Preset, TransferFunction};
 use crate::volume::{Space, Volume};
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::sync::Arc;
 
 /// What a document names but does not hold.
@@ -31,7 +32,7 @@ pub struct SceneError {
     pub problem: String,
 }
 
-fn fault(path: impl Into<String>, problem: impl ToString) -> SceneError {
+fn fault(path: impl Into<String>, problem: impl Display) -> SceneError {
     SceneError { path: path.into(), problem: problem.to_string() }
 }
 
@@ -202,11 +203,7 @@ fn camera(document: &Document, volume: &Volume) -> Result<Camera, SceneError> {
     let up = up.unwrap_or_else(|| {
         let up = grid.space().up();
         // Looking straight along the world's up, any upright picture will do.
-        if up.cross(view).length() > 1e-3 * view.length() {
-            up
-        } else {
-            Vec3::new(up.z, 0.0, -up.y).cross(up)
-        }
+        if up.cross(view).length() > 1e-3 * view.length() { up } else { Frame::around(up).v }
     });
     if up.cross(view).length() <= 1e-6 * up.length() * view.length() {
         let problem = format!("{up} lies along the view {view}; expected another direction");

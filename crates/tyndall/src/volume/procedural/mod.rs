@@ -54,13 +54,13 @@ impl Kind {
 pub struct Field {
     kind: Kind,
     size: [usize; 3],
-    seed: u32,
+    seed: u64,
 }
 
 impl Field {
     /// A field over `size` voxels; `seed` matters to the cloud alone.
     #[must_use]
-    pub fn new(kind: Kind, size: [usize; 3], seed: u32) -> Self {
+    pub fn new(kind: Kind, size: [usize; 3], seed: u64) -> Self {
         Self { kind, size, seed }
     }
 
@@ -86,7 +86,7 @@ impl Field {
             Kind::Sphere => f32::from(self.centred(p).length() <= 0.4 * self.shortest_side()),
             Kind::Shells => f32::from(self.shell(p)) / 8.0,
             Kind::MarschnerLobb => marschner_lobb::value(self.stretched(p)),
-            Kind::Cloud => cloud::value(self.stretched(p), self.seed),
+            Kind::Cloud => cloud::value(self.stretched(p), cast::low_u32(self.seed ^ (self.seed >> 32))),
             Kind::CornellBox => f32::from(cornell_box::material(self.stretched(p))) / 8.0,
         }
     }

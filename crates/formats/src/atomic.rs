@@ -4,10 +4,11 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{Error, ErrorKind, Result, Write};
 use std::path::{Path, PathBuf};
 
-use super::error::folder_of;
-
 /// Puts `bytes` at `path`: written to a file beside it first, then moved over what was there.
-pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
+///
+/// # Errors
+/// What the system says; nothing half-written is left behind.
+pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
     let path = destination(path)?;
     let (beside, mut file) = create_beside(&path)?;
     let written = file.write_all(bytes).and_then(|()| file.sync_all());
@@ -18,6 +19,16 @@ pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
         drop(fs::remove_file(&beside));
     }
     moved
+}
+
+/// Whether [`replace`] could put a file at `path`; leaves nothing behind.
+///
+/// # Errors
+/// What the system or a look at the place says against it.
+pub fn check(path: &Path) -> Result<()> {
+    let (beside, file) = create_beside(&destination(path)?)?;
+    drop(file);
+    fs::remove_file(beside)
 }
 
 /// Where the bytes go: through links, and never over a folder, a device or a protected file.
@@ -49,4 +60,9 @@ fn create_beside(path: &Path) -> Result<(PathBuf, File)> {
         }
     }
     Err(Error::new(ErrorKind::AlreadyExists, "the folder is full of unfinished pictures"))
+}
+
+/// The folder that a file lies in.
+pub(crate) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }

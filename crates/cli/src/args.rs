@@ -1,0 +1,177 @@
+//! The command line.
+
+use clap::{Args as Group, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Shows volumes (CT, MRI, microscopy, simulations) as light would really cross them.
+#[derive(Debug, Parser)]
+#[command(
+    name = "tyndall",
+    version,
+    about,
+    long_about = "\
+Shows volumes (CT, MRI, microscopy, simulations) as light would really cross them.
+
+A first picture:        tyndall render head.nrrd
+With another look:      tyndall render head.nrrd --preset ct-bone --size 800x800 -o head.png
+For the record:         tyndall render scene.toml --samples 256 -o figure.exr -o figure.png --stats figure.json
+The same again:         tyndall render figure.png -o again.png"
+)]
+pub struct Args {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What the program can do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene or a bare volume to pictures
+    Render(Box<RenderOptions>),
+    /// Tell what the loader understands of a volume or of a scene's volume
+    Info(InfoOptions),
+    /// List the transfer-function presets
+    Presets,
+    /// Print the JSON Schema of the scene document
+    Schema,
+    /// Print a completion script for a shell
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+}
+
+/// Options of `render`.
+#[derive(Debug, Group)]
+pub struct RenderOptions {
+    /// A scene (.toml, .json), a picture that Tyndall made, or a volume: NRRD, NIfTI, MetaImage, NumPy
+    ///
+    /// A bare volume gets a preset fit to its kind, a density of 200 / box diagonal, and an automatic camera and
+    /// lights. A picture is made again from the scene in its metadata.
+    pub input: PathBuf,
+
+    /// Write the picture to FILE: .png .jpg .tif (tone-mapped, 8 bit) or .exr (linear float); repeats
+    ///
+    /// `-` writes a PNG to standard output. Without this option the picture goes to the input's name with .png, here.
+    #[arg(short, long = "output", value_name = "FILE")]
+    pub outputs: Vec<PathBuf>,
+
+    /// Compute light by this method
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Scene")]
+    pub integrator: Option<Integrator>,
+
+    /// Stop after N samples per pixel [default: the scene's, if no other stop is given]
+    #[arg(long, value_name = "N", help_heading = "When to stop (the first met wins)",
+          value_parser = clap::value_parser!(u32).range(1..))]
+    pub samples: Option<u32>,
+
+    /// Stop after SECONDS of rendering, not counting loading
+    #[arg(long, value_name = "SECONDS", help_heading = "When to stop (the first met wins)", value_parser = positive)]
+    pub time: Option<f64>,
+
+    /// Stop when the picture's relative error (noise) is at most E, e.g. 0.02
+    #[arg(long, value_name = "E", help_heading = "When to stop (the first met wins)", value_parser = positive)]
+    pub target_error: Option<f64>,
+
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", value_parser = size, help_heading = "Scene")]
+    pub size: Option<[u32; 2]>,
+
+    /// Seed of all random numbers; the same seed gives the same bits on any number of threads
+    #[arg(long, value_name = "N", help_heading = "Scene")]
+    pub seed: Option<u64>,
+
+    /// Keep light that scattered at most K times
+    #[arg(long, value_name = "K", help_heading = "Scene")]
+    pub max_scatter: Option<u32>,
+
+    /// Use this transfer function; `tyndall presets` lists them
+    #[arg(long, value_name = "NAME", help_heading = "Scene")]
+    pub preset: Option<String>,
+
+    /// Override any key of the scene, e.g. medium.density=0.3 or lights.0.radiance=[1,2,3]; repeats
+    ///
+    /// VALUE is JSON, else a string. The other options win over it.
+    #[arg(long, value_name = "PATH=VALUE", help_heading = "Scene")]
+    pub set: Vec<String>,
+
+    /// Threads [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub threads: Option<u16>,
+
+    /// Write statistics as JSON to FILE (`-` for standard output)
+    #[arg(long, value_name = "FILE")]
+    pub stats: Option<PathBuf>,
+
+    /// Show progress even when standard error is no terminal
+    #[arg(long)]
+    pub progress: bool,
+
+    /// Print nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+
+    /// Print what is done and how long it takes
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
+}
+
+/// Options of `info`.
+#[derive(Debug, Group)]
+pub struct InfoOptions {
+    /// A volume, or a scene with one
+    pub file: PathBuf,
+
+    /// As JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Methods by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Integrator {
+    /// Emission-absorption and single scattering: fast, flat, free of noise
+    Raymarch,
+    /// Unbiased Monte Carlo of all orders of scattering: the ground truth
+    Path,
+}
+
+impl Integrator {
+    /// The name in the scene document.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Raymarch => "raymarch",
+            Self::Path => "path",
+        }
+    }
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let side = |s: &str| s.parse::<u32>().ok().filter(|&n| n > 0);
+    text.split_once(['x', 'X'])
+        .and_then(|(w, h)| Some([side(w)?, side(h)?]))
+        .ok_or_else(|| "expected WxH with whole numbers of at least 1, e.g. 512x512".into())
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|x: &f64| x.is_finite() && *x > 0.0)
+        .ok_or_else(|| "expected a number above 0".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Args::command().debug_assert();
+        assert_eq!(size("640x480"), Ok([640, 480]));
+        for bad in ["640", "0x4", "x", "4x-1", "axb"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+        assert!(positive("nan").is_err() && positive("0").is_err() && positive("0.5") == Ok(0.5));
+    }
+}

@@ -1,0 +1,44 @@
+//! How the program ends when it does not end well.
+
+use std::fmt::Display;
+use std::process::ExitCode;
+
+/// Why a command stopped; one message that names the input, what was found, what was expected and the mend.
+#[derive(Debug)]
+pub enum Failure {
+    /// The input is at fault, or what it asks for cannot be had.
+    Input(String),
+    /// The command line is at fault.
+    Usage(String),
+    /// The user stopped it; what was there has been written.
+    Interrupted,
+}
+
+impl Failure {
+    /// The input is at fault.
+    pub fn input(message: impl Display) -> Self {
+        Self::Input(message.to_string())
+    }
+
+    /// The command line is at fault.
+    pub fn usage(message: impl Display) -> Self {
+        Self::Usage(message.to_string())
+    }
+
+    /// What to print.
+    pub fn message(&self) -> Option<&str> {
+        match self {
+            Self::Input(message) | Self::Usage(message) => Some(message),
+            Self::Interrupted => None,
+        }
+    }
+
+    /// The process's exit status.
+    pub fn exit_code(&self) -> ExitCode {
+        ExitCode::from(match self {
+            Self::Input(_) => 1,
+            Self::Usage(_) => 2,
+            Self::Interrupted => 130,
+        })
+    }
+}

@@ -1,0 +1,100 @@
+//! `tyndall info`: what the loader understood.
+
+use crate::args::InfoOptions;
+use crate::input::Input;
+use crate::{Failure, say};
+use serde_json::json;
+use std::fmt::Write;
+use tyndall::scene::document::FieldKind;
+use tyndall::transfer::Preset;
+use tyndall::volume::procedural::MATERIALS;
+use tyndall::volume::{Space, Volume};
+use tyndall_formats::assets::Source;
+
+/// Bins of the histogram.
+const BINS: usize = 256;
+
+/// Prints what is known of a volume.
+pub fn run(options: &InfoOptions) -> Result<(), Failure> {
+    let input = Input::open(&options.file)?;
+    let (document, assets, source) = input.load(&options.file)?;
+    let volume = &*assets.volume;
+    if options.json {
+        return say(&format!("{:#}\n", as_json(volume, &source)));
+    }
+    let mut text = as_text(volume, &source);
+    if document.volume.procedural.is_some_and(|p| p.kind == FieldKind::CornellBox) {
+        text.push_str("materials\n");
+        for material in MATERIALS {
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "  {:<8} {}", material.value, material.name);
+        }
+    }
+    say(&text)
+}
+
+fn as_json(volume: &Volume, source: &Source) -> serde_json::Value {
+    let grid = volume.grid();
+    let histogram = volume.histogram(volume.value_range(), BINS);
+    json!({
+        "dims": grid.dims(),
+        "type": volume.voxels().type_name(),
+        "spacing": grid.spacing(),
+        "direction": grid.direction(),
+        "origin": grid.origin(),
+        "space": space(volume),
+        "value_range": volume.value_range(),
+        "robust_range": volume.robust_range(),
+        "histogram": { "range": histogram.range, "counts": histogram.counts },
+        "channels": source.channels,
+        "times": source.times,
+        "non_finite": volume.non_finite(),
+        "preset": Preset::for_volume(volume).name,
+        "notes": source.notes,
+    })
+}
+
+fn space(volume: &Volume) -> &'static str {
+    match volume.grid().space() {
+        Space::Anatomical => "anatomical (LPS millimetres)",
+        Space::Plain => "plain",
+    }
+}
+
+fn as_text(volume: &Volume, source: &Source) -> String {
+    let grid = volume.grid();
+    let [nx, ny, nz] = grid.dims();
+    let [sx, sy, sz] = grid.spacing();
+    let [ox, oy, oz] = grid.origin();
+    let [lo, hi] = volume.value_range();
+    let [robust_lo, robust_hi] = volume.robust_range();
+    let size = grid.world_bounds().size();
+    let mut text = format!(
+        "voxels     {nx} x {ny} x {nz} of {}\n\
+         spacing    {sx} x {sy} x {sz}\n\
+         size       {} x {} x {}\n\
+         origin     {ox}, {oy}, {oz}\n\
+         direction  {:?}\n\
+         space      {}\n\
+         values     {lo} to {hi}; without outliers {robust_lo} to {robust_hi}\n\
+         channels   {}, time steps {}\n\
+         preset     {}\n",
+        volume.voxels().type_name(),
+        size.x,
+        size.y,
+        size.z,
+        grid.direction(),
+        space(volume),
+        source.channels,
+        source.times,
+        Preset::for_volume(volume).name,
+    );
+    if volume.non_finite() > 0 {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "not finite {} samples, read as the smallest value", volume.non_finite());
+    }
+    for note in &source.notes {
+        let _ = writeln!(text, "note       {note}");
+    }
+    text
+}

@@ -1,0 +1,121 @@
+//! From INPUT and the options to a checked document and its assets.
+
+use crate::Failure;
+use crate::args::RenderOptions;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use tyndall::scene::Assets;
+use tyndall::scene::document::{self, Document};
+use tyndall_formats::assets;
+use tyndall_formats::image::{Metadata, read_metadata};
+
+/// A document as it was found, before any override.
+pub struct Input {
+    /// The document.
+    pub value: Value,
+    /// The folder that its paths start from.
+    pub folder: PathBuf,
+    /// Whether it is a volume without a scene, whose look is chosen here.
+    pub bare: bool,
+}
+
+/// Density of a bare volume times its box's diagonal: opaque matter stops light within a 200th of it.
+const BARE_THICKNESS: f32 = 200.0;
+
+/// Text documents larger than this are no scenes.
+const LARGEST_DOCUMENT: u64 = 256 << 20;
+
+impl Input {
+    /// Finds out what INPUT is: a scene by its extension, a picture with a scene inside, or a volume.
+    pub fn open(path: &Path) -> Result<Self, Failure> {
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let scene = |value| Ok(Self { value, folder: folder.clone(), bare: false });
+        match extension.as_str() {
+            "toml" => scene(in_file(path, document::value_from_toml(&read_text(path)?))?),
+            "json" => scene(in_file(path, document::value_from_json(&read_text(path)?))?),
+            "png" | "jpg" | "jpeg" | "tif" | "tiff" | "exr" => {
+                let metadata = read_metadata(path).map_err(Failure::input)?;
+                let text = metadata.as_ref().and_then(|m| m.get(Metadata::SCENE)).ok_or_else(|| {
+                    Failure::input(format!(
+                        "{}: a picture without a scene in its metadata; expected one that Tyndall made, a scene \
+                         (.toml, .json) or a volume",
+                        path.display()
+                    ))
+                })?;
+                scene(in_file(path, document::value_from_json(text))?)
+            }
+            _ => {
+                let name = path.file_name().ok_or_else(|| {
+                    Failure::input(format!(
+                        "{}: expected a file: a scene, a picture or a volume",
+                        path.display()
+                    ))
+                })?;
+                let name = name.to_str().ok_or_else(|| {
+                    Failure::input(format!("{}: a name that is no Unicode; rename the file", path.display()))
+                })?;
+                Ok(Self { value: json!({ "volume": { "path": name } }), folder, bare: true })
+            }
+        }
+    }
+
+    /// Lays the options over the document: `--set` in their order, then the others.
+    pub fn override_with(&mut self, options: &RenderOptions) -> Result<(), Failure> {
+        for assignment in &options.set {
+            document::set(&mut self.value, assignment)
+                .map_err(|e| Failure::usage(format!("--set {assignment}: {e}")))?;
+        }
+        let mut patch = json!({});
+        if let Some(integrator) = options.integrator {
+            patch["render"]["integrator"] = integrator.name().into();
+        }
+        if let Some(samples) = options.samples {
+            patch["render"]["samples"] = samples.into();
+        }
+        if let Some(seed) = options.seed {
+            patch["render"]["seed"] = seed.into();
+        }
+        if let Some(order) = options.max_scatter {
+            patch["render"]["max_scatter"] = order.into();
+        }
+        if let Some(size) = options.size {
+            patch["film"]["size"] = json!(size);
+        }
+        if let Some(preset) = &options.preset {
+            patch["transfer_function"]["preset"] = preset.as_str().into();
+        }
+        self.value = document::apply(&self.value, &patch);
+        Ok(())
+    }
+
+    /// Checks the document and reads what it names.
+    pub fn load(&self, path: &Path) -> Result<(Document, Assets, assets::Source), Failure> {
+        let mut document = in_file(path, Document::from_value(self.value.clone()))?;
+        let (assets, source) = assets::load(&document, &self.folder).map_err(Failure::input)?;
+        if self.bare && self.value.pointer("/medium/density").is_none() {
+            document.medium.density = BARE_THICKNESS / assets.volume.grid().diagonal();
+        }
+        Ok((document, assets, source))
+    }
+}
+
+/// Says of which file the trouble is.
+fn in_file<T>(path: &Path, result: Result<T, document::DocumentError>) -> Result<T, Failure> {
+    result.map_err(|e| Failure::input(format!("{}: {e}", path.display())))
+}
+
+fn read_text(path: &Path) -> Result<String, Failure> {
+    let fail = |problem: &dyn std::fmt::Display| Failure::input(format!("{}: {problem}", path.display()));
+    let about = std::fs::metadata(path).map_err(|e| fail(&e))?;
+    if !about.is_file() {
+        return Err(fail(&"not a file; expected a scene document"));
+    }
+    if about.len() > LARGEST_DOCUMENT {
+        return Err(fail(&format!("{} bytes; a scene document has at most {LARGEST_DOCUMENT}", about.len())));
+    }
+    let bytes = std::fs::read(path).map_err(|e| fail(&e))?;
+    String::from_utf8(bytes).map_err(|e| {
+        fail(&format!("byte {} is no UTF-8; save the scene as UTF-8", e.utf8_error().valid_up_to()))
+    })
+}

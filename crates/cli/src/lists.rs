@@ -1,0 +1,16 @@
+//! `tyndall presets` and `tyndall schema`.
+
+use crate::{Failure, say};
+use tyndall::scene::document;
+use tyndall::transfer::{PRESETS, Preset};
+
+/// One preset a line.
+pub fn presets() -> Result<(), Failure> {
+    let line = |preset: &Preset| format!("{:<14} {}\n", preset.name, preset.about);
+    say(&PRESETS.iter().map(line).collect::<String>())
+}
+
+/// The JSON Schema of the scene document.
+pub fn schema() -> Result<(), Failure> {
+    say(&format!("{:#}\n", document::schema()))
+}

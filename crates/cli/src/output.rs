@@ -1,0 +1,132 @@
+//! Pictures and statistics to where they were asked for.
+
+use crate::{Failure, say};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use tyndall::film::tone::ToneCurve;
+use tyndall::film::{Film, Image};
+use tyndall::scene::document::{Background, Document, Light, Tone};
+use tyndall_formats::image::{Display, Metadata, Picture, encode_png, write};
+
+/// The name of standard output.
+const STDOUT: &str = "-";
+
+/// Where pictures go: as asked, or the input's stem with .png in this folder.
+pub fn places(asked: &[PathBuf], input: &Path) -> Vec<PathBuf> {
+    if !asked.is_empty() {
+        return asked.to_vec();
+    }
+    let name = input.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    // "head.nii.gz" has two extensions.
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    let stem = Path::new(name).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    vec![PathBuf::from(format!("{stem}.png"))]
+}
+
+/// Refuses, before any work, places where no picture can be written.
+pub fn check(places: &[PathBuf]) -> Result<(), Failure> {
+    for place in places.iter().filter(|p| p.as_os_str() != STDOUT) {
+        tyndall_formats::image::check_destination(place).map_err(Failure::input)?;
+    }
+    Ok(())
+}
+
+/// Writes the film to every place.
+pub fn pictures(
+    places: &[PathBuf],
+    film: &Film,
+    document: &Document,
+    source_folder: &Path,
+) -> Result<(), Failure> {
+    let Image { size, rgba, variance, depth } = film.image();
+    let picture = Picture {
+        width: size[0],
+        height: size[1],
+        rgba,
+        variance: Some(variance),
+        depth: Some(depth),
+        transparent: document.film.background == Background::Transparent,
+    };
+    let tone = match document.film.tone {
+        Tone::Agx => ToneCurve::Agx,
+        Tone::Linear => ToneCurve::Linear,
+        Tone::Reinhard => ToneCurve::Reinhard,
+        Tone::Aces => ToneCurve::Aces,
+    };
+    let display = Display { tone, exposure: document.film.exposure };
+    for place in places {
+        let to_stdout = place.as_os_str() == STDOUT;
+        let folder = if to_stdout { Path::new("") } else { place.parent().unwrap_or(Path::new("")) };
+        let metadata = metadata(film, document, source_folder, folder);
+        if to_stdout {
+            let bytes = encode_png(&picture, &display, &metadata).map_err(Failure::input)?;
+            let mut out = std::io::stdout().lock();
+            out.write_all(&bytes).and_then(|()| out.flush()).map_err(|e| {
+                Failure::input(format!("standard output: {e}; what reads the picture must stay open"))
+            })?;
+        } else {
+            write(place, &picture, &display, &metadata).map_err(Failure::input)?;
+        }
+    }
+    Ok(())
+}
+
+/// The scene with its paths seen from the picture's folder, so that both can move together.
+fn metadata(film: &Film, document: &Document, from: &Path, to: &Path) -> Metadata {
+    let mut document = document.clone();
+    document.render.samples = film.samples().max(1);
+    let moved = |path: &mut String| *path = relocate(path, from, to);
+    document.volume.path.iter_mut().for_each(moved);
+    for light in document.lights.iter_mut().flatten() {
+        if let Light::Environment { map: Some(map), .. } = light {
+            moved(map);
+        }
+    }
+    let mut metadata = Metadata::default();
+    metadata.insert(Metadata::SCENE, document.to_value().to_string());
+    metadata.insert(Metadata::VERSION, env!("CARGO_PKG_VERSION"));
+    metadata.insert(Metadata::SEED, document.render.seed.to_string());
+    metadata.insert(Metadata::SAMPLES, film.samples().to_string());
+    metadata
+}
+
+/// A path that starts from one folder, written to start from another; absolute if no way leads there.
+fn relocate(path: &str, from: &Path, to: &Path) -> String {
+    let absolute = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_owned());
+    let here = if to.as_os_str().is_empty() { PathBuf::from(".") } else { to.to_owned() };
+    let target = absolute(&from.join(path));
+    let way = pathdiff::diff_paths(&target, absolute(&here)).unwrap_or(target);
+    way.to_string_lossy().replace('\\', "/")
+}
+
+/// Writes statistics as JSON.
+pub fn statistics(place: &Path, value: &serde_json::Value) -> Result<(), Failure> {
+    let text = format!("{value:#}\n");
+    if place.as_os_str() == STDOUT {
+        return say(&text);
+    }
+    tyndall_formats::atomic::replace(place, text.as_bytes())
+        .map_err(|e| Failure::input(format!("{}: statistics cannot be written: {e}", place.display())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_place_is_the_stem_here() {
+        let place = |input: &str| places(&[], Path::new(input))[0].to_string_lossy().into_owned();
+        assert_eq!(place("a/head.nrrd"), "head.png");
+        assert_eq!(place("a/b.c/head.nii.gz"), "head.png");
+        assert_eq!(place("scene.toml"), "scene.png");
+    }
+
+    #[test]
+    fn paths_follow_the_picture() {
+        let moved = |path, from: &str, to: &str| relocate(path, Path::new(from), Path::new(to));
+        assert_eq!(moved("head.nrrd", "data", "out"), "../data/head.nrrd");
+        assert_eq!(moved("head.nrrd", "data", ""), "data/head.nrrd");
+        assert_eq!(moved("head.nrrd", "", ""), "head.nrrd");
+        assert_eq!(moved("../x/head.nrrd", "data/a", "data"), "x/head.nrrd");
+    }
+}

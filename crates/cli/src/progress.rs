@@ -1,0 +1,66 @@
+//! Progress on standard error: a bar on a terminal, lines elsewhere when asked for.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::{IsTerminal, Write};
+use std::time::{Duration, Instant};
+use tyndall::math::cast::{index, single};
+
+/// How progress shows.
+pub enum Display {
+    /// Not at all.
+    None,
+    /// A bar with the remaining time and the current error.
+    Bar(ProgressBar),
+    /// A line every few seconds.
+    Lines {
+        /// When the last one was printed.
+        last: Instant,
+    },
+}
+
+const LINES_EVERY: Duration = Duration::from_secs(2);
+
+impl Display {
+    /// A bar on a terminal; lines if `forced` elsewhere; nothing if `quiet`.
+    pub fn new(forced: bool, quiet: bool) -> Self {
+        if quiet {
+            return Self::None;
+        }
+        if std::io::stderr().is_terminal() {
+            let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {msg}");
+            let bar = ProgressBar::new(1000);
+            // The template is fixed; were it ever refused, the default style would do.
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            return Self::Bar(bar);
+        }
+        if forced { Self::Lines { last: Instant::now() } } else { Self::None }
+    }
+
+    /// Shows the share done (0 to 1), the seconds left and the error so far.
+    pub fn show(&mut self, share: f64, samples: f64, left: Option<f64>, error: Option<f64>) {
+        let left = left.map_or_else(String::new, |s| format!(", {s:.0} s left"));
+        let error = error.map_or_else(String::new, |e| format!(", error {e:.4}"));
+        let text = format!("{samples:.1} samples{left}{error}");
+        match self {
+            Self::None => {}
+            Self::Bar(bar) => {
+                bar.set_position(index(single(1000.0 * share)) as u64);
+                bar.set_message(text);
+            }
+            Self::Lines { last } => {
+                if last.elapsed() >= LINES_EVERY {
+                    *last = Instant::now();
+                    // Progress is a courtesy: where stderr is closed it is dropped.
+                    drop(writeln!(std::io::stderr(), "{:3.0} %  {text}", 100.0 * share));
+                }
+            }
+        }
+    }
+
+    /// Takes the bar away.
+    pub fn finish(&self) {
+        if let Self::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! `tyndall render`.
+
+use crate::Failure;
+use crate::args::RenderOptions;
+use crate::input::Input;
+use crate::output;
+use crate::progress::Display;
+use crate::stats::{Stages, peak_memory};
+use serde_json::json;
+use std::io::Write;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use tyndall::film::Film;
+use tyndall::scene::Scene;
+use tyndall::session::{Budget, Session};
+
+/// How often progress is looked at.
+const SLICE: Duration = Duration::from_millis(100);
+
+/// The error of the picture is looked at this often, and costs a walk over all pixels.
+const ERROR_EVERY: Duration = Duration::from_millis(500);
+
+/// When to stop.
+struct Stop {
+    samples: u32,
+    time: Option<Duration>,
+    error: Option<f64>,
+}
+
+/// Renders INPUT to pictures and statistics.
+pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
+    let note = |text: &str| {
+        if options.verbose {
+            // A courtesy, like progress.
+            drop(writeln!(std::io::stderr(), "tyndall: {text}"));
+        }
+    };
+    let mut stages = Stages::new(started);
+    let threads = pool(options.threads)?;
+    let places = output::places(&options.outputs, &options.input);
+    output::check(&places)?;
+
+    let mut input = Input::open(&options.input)?;
+    input.override_with(options)?;
+    let (document, assets, source) = threads.install(|| input.load(&options.input))?;
+    let load_s = stages.end("load");
+    if !options.quiet {
+        for text in &source.notes {
+            drop(writeln!(std::io::stderr(), "tyndall: note: {text}"));
+        }
+    }
+    refuse_film_that_does_not_fit(document.film.size)?;
+    let scene = threads
+        .install(|| Scene::build(&document, &assets))
+        .map_err(|e| Failure::input(format!("{}: {e}", options.input.display())))?;
+    let mut session = Session::new(scene, threads.clone());
+    let prepared = stages.end("prepare");
+    note(&format!(
+        "loaded in {load_s:.2} s, prepared in {prepared:.2} s, {} threads",
+        threads.current_num_threads()
+    ));
+
+    let limited = options.time.is_some() || options.target_error.is_some();
+    let stop = Stop {
+        samples: if limited && options.samples.is_none() { u32::MAX } else { document.render.samples },
+        time: options.time.map(Duration::from_secs_f64),
+        error: options.target_error,
+    };
+    let interrupted = on_interrupt();
+    let display = Display::new(options.progress, options.quiet);
+    refine(&mut session, &stop, &interrupted, display);
+    let rendered = stages.end("render");
+    note(&format!("{:.2} samples per pixel in {rendered:.2} s", session.film().mean_samples()));
+
+    output::pictures(&places, session.film(), &document, &input.folder)?;
+    stages.end("write");
+    if let Some(place) = &options.stats {
+        let film = session.film();
+        let statistics = json!({
+            "integrator": session.scene().render.integrator.name(),
+            "size": film.size(),
+            "samples_per_pixel": film.mean_samples(),
+            "wall_s": started.elapsed().as_secs_f64(),
+            "load_s": load_s,
+            "stages": stages.to_value(),
+            "mean_radiance": film.mean_radiance(),
+            "relative_error": session.relative_error(),
+            "peak_memory_bytes": peak_memory(),
+            "threads": threads.current_num_threads(),
+            "seed": document.render.seed,
+        });
+        output::statistics(place, &statistics)?;
+    }
+    if interrupted.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
+}
+
+/// Refines slice by slice until a stop is met, showing how far it is.
+fn refine(session: &mut Session, stop: &Stop, cancel: &Arc<AtomicBool>, mut display: Display) {
+    let begun = Instant::now();
+    let end = stop.time.map(|time| begun + time);
+    let mut looked = begun;
+    let mut error = None;
+    loop {
+        let slice = Instant::now() + SLICE;
+        // The first sample of every pixel is always taken: no picture has holes.
+        let complete = session.film().samples() > 0;
+        let deadline = if complete { end.map_or(slice, |end| end.min(slice)) } else { slice };
+        let budget = Budget { samples: stop.samples, deadline: Some(deadline), cancel: cancel.clone() };
+        session.refine(&budget);
+
+        let film = session.film();
+        let seconds = begun.elapsed().as_secs_f64();
+        let samples_done = film.samples() >= stop.samples;
+        if looked.elapsed() >= ERROR_EVERY || samples_done || begun.elapsed() < ERROR_EVERY {
+            looked = Instant::now();
+            error = session.relative_error();
+        }
+        let time_is_up = film.samples() > 0 && end.is_some_and(|end| Instant::now() >= end);
+        let good_enough = stop.error.zip(error).is_some_and(|(target, error)| error <= target);
+        if samples_done || time_is_up || good_enough || cancel.load(Ordering::Relaxed) {
+            break;
+        }
+        let shares = [
+            Some(film.mean_samples() / f64::from(stop.samples)),
+            stop.time.map(|time| seconds / time.as_secs_f64()),
+            // Noise falls with the square root of the work.
+            stop.error.zip(error).map(|(target, error)| (target / error).powi(2)),
+        ];
+        let share = shares.into_iter().flatten().fold(0.0, f64::max).min(1.0);
+        let left = (share > 0.0).then(|| seconds * (1.0 - share) / share);
+        display.show(share, film.mean_samples(), left, error);
+    }
+    display.finish();
+}
+
+fn pool(threads: Option<u16>) -> Result<Arc<rayon::ThreadPool>, Failure> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.map_or(0, usize::from))
+        .build()
+        .map(Arc::new)
+        .map_err(|e| Failure::usage(format!("--threads: {e}")))
+}
+
+/// A flag that Ctrl-C raises; a second Ctrl-C ends at once.
+fn on_interrupt() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let raised = flag.clone();
+    // Without a handler Ctrl-C still ends the program, only without a picture.
+    drop(ctrlc::set_handler(move || {
+        if raised.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    }));
+    flag
+}
+
+fn refuse_film_that_does_not_fit(size: [u32; 2]) -> Result<(), Failure> {
+    // The film, the picture with its layers, and the encoder's copy of it.
+    let needed = 3 * Film::bytes(size);
+    match tyndall_formats::memory::available() {
+        Some(available) if needed > available => Err(Failure::input(format!(
+            "`film.size`: {} x {} pixels need {} MiB, but {} MiB are free; expected a smaller picture",
+            size[0],
+            size[1],
+            needed >> 20,
+            available >> 20
+        ))),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,144 @@
+//! Everything that a scene document names: its volume and its environment maps.
+
+use crate::image::{ImageError, read_map};
+use crate::volume::{Endian, RawLayout, ReadError, SampleType, read, read_raw};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tyndall::light::{Map, MapError};
+use tyndall::scene::Assets;
+use tyndall::scene::document::{self, Document};
+use tyndall::volume::procedural::{Field, Kind};
+use tyndall::volume::{GridError, Interpolation};
+
+/// What a volume's source said beside the volume.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Source {
+    /// Components per voxel in the file.
+    pub channels: usize,
+    /// Time steps in the file.
+    pub times: usize,
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+/// Why an asset could not be had.
+#[derive(Debug, thiserror::Error)]
+pub enum AssetError {
+    /// The volume's file.
+    #[error(transparent)]
+    Volume(#[from] ReadError),
+    /// The procedural field.
+    #[error("`volume.procedural.size`: {0}")]
+    Field(#[from] GridError),
+    /// The memory that a procedural field would take.
+    #[error("`volume.procedural.size`: {dims:?} voxels need {} MiB, but {} MiB are free; expected a smaller field", .needed >> 20, .available >> 20)]
+    Memory {
+        /// Voxels along each axis.
+        dims: [usize; 3],
+        /// Bytes.
+        needed: u64,
+        /// Bytes.
+        available: u64,
+    },
+    /// An environment map's file.
+    #[error("`lights.{light}.map`: {source}")]
+    MapFile {
+        /// Number of the light.
+        light: usize,
+        /// Why.
+        source: ImageError,
+    },
+    /// An environment map's content.
+    #[error("`lights.{light}.map`: {}: {source}", .path.display())]
+    Map {
+        /// Number of the light.
+        light: usize,
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: MapError,
+    },
+}
+
+/// Reads what a document names; its paths start from `folder`. In parallel on the current thread pool.
+///
+/// # Errors
+/// [`AssetError`] names the file or key.
+pub fn load(document: &Document, folder: &Path) -> Result<(Assets, Source), AssetError> {
+    let (volume, source) = volume(&document.volume, folder)?;
+    let interpolation = match document.volume.interpolation {
+        document::Interpolation::Linear => Interpolation::Linear,
+        document::Interpolation::Nearest => Interpolation::Nearest,
+    };
+    let mut maps = BTreeMap::new();
+    for (light, l) in document.lights.iter().flatten().enumerate() {
+        let document::Light::Environment { map: Some(name), .. } = l else { continue };
+        if !maps.contains_key(name) {
+            let path = folder.join(name);
+            let picture = read_map(&path).map_err(|source| AssetError::MapFile { light, source })?;
+            let map = Map::new(picture.width, picture.height, picture.pixels)
+                .map_err(|source| AssetError::Map { light, path, source })?;
+            maps.insert(name.clone(), Arc::new(map));
+        }
+    }
+    Ok((Assets { volume: Arc::new(volume.with_interpolation(interpolation)), maps }, source))
+}
+
+fn volume(
+    described: &document::Volume,
+    folder: &Path,
+) -> Result<(tyndall::volume::Volume, Source), AssetError> {
+    if let Some(procedural) = &described.procedural {
+        return field(procedural);
+    }
+    // The document's own check demands one of both.
+    let path = folder.join(described.path.as_deref().unwrap_or_default());
+    let loaded = match &described.raw {
+        Some(raw) => read_raw(&path, &layout(raw)),
+        None => read(&path),
+    }?;
+    let source = Source { channels: loaded.channels, times: loaded.times, notes: loaded.notes };
+    Ok((loaded.volume, source))
+}
+
+fn field(described: &document::Procedural) -> Result<(tyndall::volume::Volume, Source), AssetError> {
+    let kind = match described.kind {
+        document::FieldKind::Constant => Kind::Constant,
+        document::FieldKind::Sphere => Kind::Sphere,
+        document::FieldKind::Shells => Kind::Shells,
+        document::FieldKind::MarschnerLobb => Kind::MarschnerLobb,
+        document::FieldKind::Cloud => Kind::Cloud,
+        document::FieldKind::CornellBox => Kind::CornellBox,
+    };
+    let dims = described.size.map(|n| n as usize);
+    let needed = dims.iter().fold(4_u64, |bytes, &n| bytes.saturating_mul(n as u64));
+    if let Some(available) = crate::memory::available().filter(|&available| needed > available) {
+        return Err(AssetError::Memory { dims, needed, available });
+    }
+    let volume = Field::new(kind, dims, described.seed).volume()?;
+    Ok((volume, Source { channels: 1, times: 1, notes: Vec::new() }))
+}
+
+fn layout(raw: &document::Raw) -> RawLayout {
+    RawLayout {
+        dims: raw.dims.map(|n| n as usize),
+        dtype: match raw.dtype {
+            document::DataType::U8 => SampleType::U8,
+            document::DataType::I8 => SampleType::I8,
+            document::DataType::U16 => SampleType::U16,
+            document::DataType::I16 => SampleType::I16,
+            document::DataType::U32 => SampleType::U32,
+            document::DataType::I32 => SampleType::I32,
+            document::DataType::F32 => SampleType::F32,
+            document::DataType::F64 => SampleType::F64,
+        },
+        endian: match raw.endian {
+            document::Endian::Little => Endian::Little,
+            document::Endian::Big => Endian::Big,
+        },
+        offset: raw.offset,
+        spacing: raw.spacing,
+        origin: raw.origin,
+    }
+}

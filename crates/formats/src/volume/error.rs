@@ -1,0 +1,158 @@
+//! Why a volume file could not be read.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use tyndall::volume::{GridError, VolumeError};
+
+/// The kinds that [`super::read`] knows, for messages.
+pub(super) const KINDS: &str =
+    "NRRD (.nrrd, .nhdr), NIfTI (.nii, .nii.gz, .hdr + .img), MetaImage (.mha, .mhd) and NumPy (.npy)";
+
+/// Why a volume file could not be read. Each message names the file, what was found, what was
+/// expected and, where it helps, the mend.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The operating system refused.
+    #[error("{}: cannot be read: {source}", .path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A folder, a pipe or a device.
+    #[error("{}: {found}, expected a regular file", .path.display())]
+    NotAFile {
+        /// What was asked for.
+        path: PathBuf,
+        /// What stands there instead.
+        found: &'static str,
+    },
+    /// No byte in it.
+    #[error("{}: the file is empty, expected a volume", .path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Neither the first bytes nor the extension tell a kind.
+    #[error("{}: no kind of volume that is known here; known are {KINDS}; for raw samples state their layout", .path.display())]
+    UnknownKind {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A header says something that cannot be.
+    #[error("{}: {key}: found {found}, expected {expected}", .path.display())]
+    Header {
+        /// The file.
+        path: PathBuf,
+        /// The header's key, or the place in it.
+        key: String,
+        /// What stands there.
+        found: String,
+        /// What may stand there.
+        expected: String,
+    },
+    /// A valid file of a sort that is not read here.
+    #[error("{}: {what} is not supported; {mend}", .path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// The feature.
+        what: String,
+        /// How to get round it.
+        mend: String,
+    },
+    /// Fewer samples than the header asks for.
+    #[error("{}: {found} bytes of samples, expected {expected} by the header; the file is cut short or its header is wrong", .path.display())]
+    Short {
+        /// The file that holds the samples.
+        path: PathBuf,
+        /// Bytes after decompression (of text: samples).
+        found: u64,
+        /// Bytes that the header asks for (of text: samples).
+        expected: u64,
+    },
+    /// The compressed stream or the text of the samples is damaged.
+    #[error("{}: the samples are damaged: {message}", .path.display())]
+    Damaged {
+        /// The file that holds the samples.
+        path: PathBuf,
+        /// What the decoder said.
+        message: String,
+    },
+    /// The samples would not fit.
+    #[error("{}: needs {needed} bytes of memory, but {available} are available; crop or downsample it", .path.display())]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// Bytes that the samples take.
+        needed: u64,
+        /// Bytes that the machine has left.
+        available: u64,
+    },
+    /// The file that a header names cannot be read.
+    #[error("{}: its data file: {source}", .path.display())]
+    DataFile {
+        /// The header's file.
+        path: PathBuf,
+        /// What is wrong with the other.
+        source: Box<ReadError>,
+    },
+    /// The header's geometry cannot be.
+    #[error("{}: {source}", .path.display())]
+    Grid {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: GridError,
+    },
+    /// Samples and grid make no volume.
+    #[error("{}: {source}", .path.display())]
+    Volume {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: VolumeError,
+    },
+}
+
+impl ReadError {
+    /// A header's entry that cannot be; quotes what was found.
+    pub(super) fn header(path: &Path, key: &str, found: &str, expected: &str) -> Self {
+        Self::Header { path: path.into(), key: key.into(), found: excerpt(found), expected: expected.into() }
+    }
+
+    /// A header's entry that is not there.
+    pub(super) fn missing(path: &Path, key: &str, expected: &str) -> Self {
+        Self::Header {
+            path: path.into(),
+            key: key.into(),
+            found: "nothing".into(),
+            expected: expected.into(),
+        }
+    }
+
+    /// Something valid that is not read here.
+    pub(super) fn unsupported(path: &Path, what: impl Into<String>, mend: impl Into<String>) -> Self {
+        Self::Unsupported { path: path.into(), what: what.into(), mend: mend.into() }
+    }
+
+    /// A trouble of the operating system; one that carries a [`ReadError`] gives it back.
+    pub(super) fn io(path: &Path, error: io::Error) -> Self {
+        error.downcast::<Self>().unwrap_or_else(|source| Self::Io { path: path.into(), source })
+    }
+
+    /// The same trouble, in the data file that `header` names.
+    pub(super) fn in_data_file(self, header: &Path) -> Self {
+        Self::DataFile { path: header.into(), source: Box::new(self) }
+    }
+}
+
+/// At most 60 characters of what a file says, quoted and without control characters.
+pub(super) fn excerpt(text: &str) -> String {
+    let mut short: String = text.chars().take(60).flat_map(char::escape_debug).collect();
+    if text.chars().nth(60).is_some() {
+        short.push_str("...");
+    }
+    format!("`{short}`")
+}

@@ -1,0 +1,156 @@
+//! Volume files: NRRD, NIfTI, MetaImage, NumPy arrays and raw samples.
+//!
+//! Every reader gives the grid in Tyndall's world (anatomical files in LPS millimetres), the samples in
+//! the type that the file has, and the map from them to data values. Of several channels or time steps
+//! the first is read. A file that is damaged, cut short or lies about its size gives a [`ReadError`];
+//! memory grows with what the file really holds.
+
+mod detached;
+mod error;
+mod fields;
+mod layout;
+mod metaimage;
+mod nifti;
+mod nrrd;
+mod numpy;
+mod placement;
+mod raw;
+mod sample_type;
+mod stream;
+
+pub use error::ReadError;
+pub use raw::{RawLayout, read_raw};
+pub use sample_type::{Endian, SampleType, UnknownName};
+
+use std::path::Path;
+use tyndall::volume::{Grid, ValueMap, Volume, Voxels};
+
+/// A volume and what else its file said.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The first channel at the first time.
+    pub volume: Volume,
+    /// Components per voxel in the file.
+    pub channels: usize,
+    /// Time steps in the file.
+    pub times: usize,
+    /// What a user should know: parts of the file that were left out, guesses, doubts.
+    pub notes: Vec<String>,
+}
+
+/// Reads a volume of any known kind; the first bytes tell which, whatever the file's name.
+///
+/// # Errors
+/// [`ReadError`] if the file is missing, of no known kind, damaged, or too large for the memory.
+pub fn read(path: &Path) -> Result<Loaded, ReadError> {
+    match kind(path)? {
+        Some(Kind::Nrrd) => nrrd::read(path),
+        Some(Kind::Nifti) => nifti::read(path),
+        Some(Kind::MetaImage) => metaimage::read(path),
+        Some(Kind::Numpy) => numpy::read(path),
+        None => Err(ReadError::UnknownKind { path: path.into() }),
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Nrrd,
+    Nifti,
+    MetaImage,
+    Numpy,
+}
+
+/// The kind by the first bytes; by the name for what has no mark there: the samples of a NIfTI pair, and
+/// MetaImage headers that begin unusually.
+fn kind(path: &Path) -> Result<Option<Kind>, ReadError> {
+    let head = stream::fill_head(path)?;
+    if head.starts_with(b"NRRD00") {
+        return Ok(Some(Kind::Nrrd));
+    }
+    if head.starts_with(b"\x93NUMPY") {
+        return Ok(Some(Kind::Numpy));
+    }
+    if nifti::recognises(&head) {
+        return Ok(Some(Kind::Nifti));
+    }
+    if metaimage::recognises(&head) {
+        return Ok(Some(Kind::MetaImage));
+    }
+    let name = path.file_name().map(|n| n.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    Ok(match name.rsplit_once('.').map(|(_, extension)| extension) {
+        Some("nrrd" | "nhdr") => Some(Kind::Nrrd),
+        Some("nii" | "hdr" | "img") => Some(Kind::Nifti),
+        Some("mha" | "mhd") => Some(Kind::MetaImage),
+        Some("npy") => Some(Kind::Numpy),
+        _ => None,
+    })
+}
+
+/// What a reader found, before the volume derives its ranges.
+struct Parsed {
+    grid: Grid,
+    voxels: Voxels,
+    values: ValueMap,
+    channels: usize,
+    times: usize,
+    notes: Vec<String>,
+}
+
+impl Parsed {
+    fn load(self, path: &Path) -> Result<Loaded, ReadError> {
+        let Self { grid, voxels, values, channels, times, mut notes } = self;
+        if channels > 1 {
+            notes.push(format!("{channels} channels: the first was read"));
+        }
+        if times > 1 {
+            notes.push(format!("{times} time steps: the first was read"));
+        }
+        let volume = Volume::new(grid, voxels, values)
+            .map_err(|source| ReadError::Volume { path: path.into(), source })?;
+        Ok(Loaded { volume, channels, times, notes })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+    use tempfile::TempDir;
+
+    /// A file in a folder of its own, which lives as long as the first value.
+    pub(super) fn folder_with(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        (folder, path)
+    }
+
+    #[test]
+    fn the_first_bytes_win_over_the_name() {
+        let nrrd = b"NRRD0004\ntype: uchar\ndimension: 1\nsizes: 2\nencoding: raw\n\n\x01\x02";
+        for name in ["a.nii.gz", "a.mha", "a", "a.npy", "a.raw"] {
+            let (_folder, path) = folder_with(name, nrrd);
+            assert_eq!(read(&path).unwrap().volume.voxels(), &Voxels::U8(vec![1, 2]), "{name}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_volume_is_told() {
+        let (folder, path) = folder_with("a.txt", b"hello");
+        let message = read(&path).unwrap_err().to_string();
+        assert!(
+            ["a.txt", "NRRD", "NIfTI", "MetaImage", "NumPy"].iter().all(|w| message.contains(w)),
+            "{message}"
+        );
+        assert!(matches!(read(folder.path()), Err(ReadError::NotAFile { found: "a folder", .. })));
+        assert!(matches!(read(&folder.path().join("none.nrrd")), Err(ReadError::Io { .. })));
+        let (_folder, path) = folder_with("a.nrrd", b"");
+        assert!(matches!(read(&path), Err(ReadError::Empty { .. })));
+        for name in ["a.nrrd", "a.nii", "a.nii.gz", "a.hdr", "a.mha", "a.mhd", "a.npy"] {
+            let (_folder, path) = folder_with(name, b"hello");
+            let error = read(&path).unwrap_err();
+            assert!(!matches!(error, ReadError::UnknownKind { .. }), "{name}: {error}");
+        }
+    }
+}

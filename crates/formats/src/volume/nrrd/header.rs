@@ -1,0 +1,60 @@
+//! The text header of an NRRD file.
+
+use super::super::error::ReadError;
+use super::super::fields::{Fields, Lines};
+use std::io::BufRead;
+use std::path::Path;
+
+/// The fields, and the data files if the header lists them.
+pub(super) struct Header<'a> {
+    pub fields: Fields<'a>,
+    /// Names after `data file: LIST`.
+    pub listed: Vec<String>,
+}
+
+/// Reads up to and with the blank line that ends the header; a header that names data files may end with
+/// its file. Comments and key/value pairs (`key:=value`) say nothing about the array.
+pub(super) fn read<'a>(path: &'a Path, reader: &mut dyn BufRead) -> Result<Header<'a>, ReadError> {
+    let mut lines = Lines::new(path, reader);
+    let magic = lines.next_line()?.unwrap_or_default();
+    if !matches!(magic.trim_end(), "NRRD0001" | "NRRD0002" | "NRRD0003" | "NRRD0004" | "NRRD0005") {
+        return Err(ReadError::header(path, "first line", &magic, "NRRD0001 to NRRD0005"));
+    }
+    let mut fields = Fields::new(path);
+    let mut listed = Vec::new();
+    while let Some(line) = lines.next_line()? {
+        if line.is_empty() {
+            return Ok(Header { fields, listed });
+        }
+        if line.starts_with('#') || is_pair(&line) {
+            continue;
+        }
+        let Some((key, value)) = line.split_once(':') else {
+            return Err(ReadError::header(
+                path,
+                "header line",
+                &line,
+                "`field: value`, `key:=value` or `# comment`",
+            ));
+        };
+        fields.insert(key, value);
+        let value = value.trim();
+        if fields.get(&["data file"]) == Some(value) && (value == "LIST" || value.starts_with("LIST ")) {
+            while let Some(name) = lines.next_line()? {
+                if !name.trim().is_empty() {
+                    listed.push(name.trim().to_string());
+                }
+            }
+        }
+    }
+    if fields.get(&["data file"]).is_none() {
+        let expected = "a blank line after the header, or a `data file` field";
+        return Err(ReadError::missing(path, "end of the header", expected));
+    }
+    Ok(Header { fields, listed })
+}
+
+/// Whether the first colon of the line begins `:=`.
+fn is_pair(line: &str) -> bool {
+    line.split_once(':').is_some_and(|(_, rest)| rest.starts_with('='))
+}

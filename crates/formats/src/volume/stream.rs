@@ -1,0 +1,234 @@
+//! Bytes of a file: opened, skipped through, decompressed.
+
+use super::error::ReadError;
+use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom, Take};
+use std::path::{Path, PathBuf};
+
+/// What every gzip stream begins with.
+pub(super) const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// How the samples were compressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Coding {
+    Raw,
+    Gzip,
+    Bzip2,
+    /// zlib, or gzip if the stream begins so.
+    Zlib,
+}
+
+/// Where in a file the samples begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Start {
+    /// As many bytes after the present position; after decompression.
+    After(u64),
+    /// So that they end where the file ends; not compressed.
+    AtEnd,
+}
+
+/// The samples' bytes from the first one on.
+pub(super) struct Stream<'a> {
+    pub reader: Box<dyn BufRead + 'a>,
+    /// Bytes left, where they are not compressed and therefore known.
+    pub available: Option<u64>,
+}
+
+/// Opens a regular file that is not empty.
+pub(super) fn open(path: &Path) -> Result<BufReader<File>, ReadError> {
+    let trouble = |source| ReadError::io(path, source);
+    // Asked before opening: opening a pipe would wait for its other end.
+    let meta = std::fs::metadata(path).map_err(trouble)?;
+    if !meta.is_file() {
+        let found = if meta.is_dir() { "a folder" } else { "a pipe or a device" };
+        return Err(ReadError::NotAFile { path: path.into(), found });
+    }
+    if meta.len() == 0 {
+        return Err(ReadError::Empty { path: path.into() });
+    }
+    Ok(BufReader::with_capacity(1 << 16, File::open(path).map_err(trouble)?))
+}
+
+/// The first bytes of a file, decompressed if it begins as gzip does; fewer where it is shorter.
+pub(super) fn fill_head(path: &Path) -> Result<Vec<u8>, ReadError> {
+    let trouble = |source| ReadError::io(path, source);
+    let mut file = open(path)?;
+    let gzip = file.fill_buf().map_err(trouble)?.starts_with(&GZIP);
+    let mut reader = decode(file, if gzip { Coding::Gzip } else { Coding::Raw }).map_err(trouble)?;
+    let mut head = vec![0; 1024];
+    // A damaged stream is told about by the reader that is chosen by the name.
+    let got = fill(&mut *reader, &mut head).unwrap_or(0);
+    head.truncate(got);
+    Ok(head)
+}
+
+/// The bytes from `start` on; `needed` is how many samples' bytes the header asks for.
+pub(super) fn samples(
+    path: &Path,
+    mut file: BufReader<File>,
+    coding: Coding,
+    start: Start,
+    needed: u64,
+) -> Result<Stream<'static>, ReadError> {
+    let trouble = |source| ReadError::io(path, source);
+    if coding != Coding::Raw {
+        let mut reader = decode(file, coding).map_err(trouble)?;
+        let Start::After(bytes) = start else {
+            let mend = "state the number of bytes to skip, or store the samples uncompressed";
+            return Err(ReadError::unsupported(path, "skipping to the end of compressed data", mend));
+        };
+        let skipped = io::copy(&mut reader.by_ref().take(bytes), &mut io::sink())
+            .map_err(|e| ReadError::Damaged { path: path.into(), message: e.to_string() })?;
+        if skipped < bytes {
+            return Err(ReadError::Short { path: path.into(), found: 0, expected: needed });
+        }
+        return Ok(Stream { reader, available: None });
+    }
+    let length = file.get_ref().metadata().map_err(trouble)?.len();
+    let position = file.stream_position().map_err(trouble)?;
+    let begin = match start {
+        Start::After(bytes) => position.saturating_add(bytes).min(length),
+        Start::AtEnd => length.saturating_sub(needed),
+    };
+    file.seek(SeekFrom::Start(begin)).map_err(trouble)?;
+    Ok(Stream { reader: Box::new(file), available: Some(length - begin) })
+}
+
+/// The decompressed bytes from the present position on.
+pub(super) fn decode(mut file: BufReader<File>, coding: Coding) -> io::Result<Box<dyn BufRead>> {
+    const CHUNK: usize = 1 << 17;
+    let coding = match coding {
+        Coding::Zlib if file.fill_buf()?.starts_with(&GZIP) => Coding::Gzip,
+        other => other,
+    };
+    Ok(match coding {
+        Coding::Raw => Box::new(file),
+        Coding::Gzip => Box::new(BufReader::with_capacity(CHUNK, MultiGzDecoder::new(file))),
+        Coding::Zlib => Box::new(BufReader::with_capacity(CHUNK, ZlibDecoder::new(file))),
+        Coding::Bzip2 => Box::new(BufReader::with_capacity(CHUNK, bzip2::bufread::MultiBzDecoder::new(file))),
+    })
+}
+
+/// Reads until `out` is full or the stream ends; returns the bytes got.
+///
+/// Decoders report a stream that stops in its middle as an early end: to the caller it is one.
+pub(super) fn fill(reader: &mut dyn Read, mut out: &mut [u8]) -> io::Result<usize> {
+    let asked = out.len();
+    while !out.is_empty() {
+        match reader.read(out) {
+            Ok(0) => break,
+            Ok(n) => out = &mut out[n..],
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            Err(e)
+                if e.kind() == ErrorKind::UnexpectedEof
+                    && e.get_ref().is_none_or(|e| !e.is::<ReadError>()) =>
+            {
+                break;
+            }
+            Err(e) => return Err(e),
+        }
+    }
+    Ok(asked - out.len())
+}
+
+/// Keeps the first `keep` bytes of every `period` bytes: the first channel of interleaved ones.
+pub(super) struct Every<R> {
+    inner: R,
+    keep: usize,
+    period: usize,
+    position: usize,
+}
+
+impl<R: BufRead> Every<R> {
+    /// `0 < keep <= period`.
+    pub fn new(inner: R, keep: usize, period: usize) -> Self {
+        assert!(0 < keep && keep <= period, "keep {keep} of {period}");
+        Self { inner, keep, period, position: 0 }
+    }
+}
+
+impl<R: BufRead> Read for Every<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let mut written = 0;
+        while written == 0 && !out.is_empty() {
+            let input = self.inner.fill_buf()?;
+            if input.is_empty() {
+                break;
+            }
+            let mut used = 0;
+            while used < input.len() && written < out.len() {
+                let left = input.len() - used;
+                let step = if self.position < self.keep {
+                    let n = (self.keep - self.position).min(left).min(out.len() - written);
+                    out[written..written + n].copy_from_slice(&input[used..used + n]);
+                    written += n;
+                    n
+                } else {
+                    (self.period - self.position).min(left)
+                };
+                used += step;
+                self.position += step;
+                if self.position == self.period {
+                    self.position = 0;
+                }
+            }
+            self.inner.consume(used);
+        }
+        Ok(written)
+    }
+}
+
+/// Several files one after the other, each with the same number of bytes; opened when reached.
+pub(super) struct Parts<F> {
+    left: VecDeque<PathBuf>,
+    bytes_each: u64,
+    open: F,
+    current: Option<(PathBuf, Take<Box<dyn BufRead>>)>,
+}
+
+impl<F: FnMut(&Path) -> Result<Stream<'static>, ReadError>> Parts<F> {
+    /// `open` gives the samples' bytes of a file.
+    pub fn new(files: Vec<PathBuf>, bytes_each: u64, open: F) -> Self {
+        Self { left: files.into(), bytes_each, open, current: None }
+    }
+}
+
+impl<F: FnMut(&Path) -> Result<Stream<'static>, ReadError>> Read for Parts<F> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        loop {
+            if let Some((path, reader)) = &mut self.current {
+                let n = reader.read(out)?;
+                if n > 0 || out.is_empty() {
+                    return Ok(n);
+                }
+                if reader.limit() > 0 {
+                    let found = self.bytes_each - reader.limit();
+                    let short = ReadError::Short { path: path.clone(), found, expected: self.bytes_each };
+                    return Err(io::Error::other(short));
+                }
+            }
+            let Some(path) = self.left.pop_front() else { return Ok(0) };
+            let stream = (self.open)(&path).map_err(io::Error::other)?;
+            self.current = Some((path, stream.reader.take(self.bytes_each)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_third_pair_is_kept_whatever_the_buffer() {
+        let input: Vec<u8> = (0..60).collect();
+        let expected: Vec<u8> = input.iter().copied().filter(|v| v % 6 < 2).collect();
+        for capacity in [1, 4, 5, 64] {
+            let mut kept = Vec::new();
+            let inner = BufReader::with_capacity(capacity, &input[..]);
+            Every::new(inner, 2, 6).read_to_end(&mut kept).unwrap();
+            assert_eq!(kept, expected, "buffer of {capacity}");
+        }
+    }
+}
