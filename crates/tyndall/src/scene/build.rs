@@ -169,8 +169,8 @@ fn default_lights(space: Space) -> Vec<Light> {
     };
     let right = up.cross(front);
     let travel = right * 0.7 - up * 0.8 - front * 0.6;
-    let sun = Directional::new(travel, Rgb::new(3.2, 3.0, 2.7), 12.0);
-    let sky = Environment::constant(Rgb::new(0.33, 0.36, 0.40), true);
+    let sun = Directional::new(travel, Rgb::new(5.0, 4.7, 4.2), 12.0);
+    let sky = Environment::constant(Rgb::new(0.22, 0.25, 0.30), true);
     vec![Light::Directional(sun), Light::Environment(sky)]
 }
 

@@ -18,8 +18,8 @@ pub(super) fn bone(_: &Profile) -> Vec<Point> {
 pub(super) fn skin_bone(_: &Profile) -> Vec<Point> {
     vec![
         matter(-700.0, 0.0, SKIN, 0.3),
-        matter(-300.0, 0.035, SKIN, 0.5),
-        matter(-150.0, 0.008, SKIN, 0.3),
+        matter(-300.0, 0.07, SKIN, 0.5),
+        matter(-150.0, 0.015, SKIN, 0.3),
         matter(80.0, 0.006, MUSCLE, 0.2),
         matter(160.0, 0.02, MUSCLE, 0.3),
         matter(300.0, 0.7, BONE, 0.6),
