@@ -52,7 +52,7 @@ impl Path {
                 }
                 break;
             };
-            let optics = medium.optics(collision.place);
+            let optics = medium.transfer().optics(collision.value);
             if order == 0 {
                 seen.alpha = 1.0;
                 seen.depth = reach * ray.direction.dot(scene.camera.view());

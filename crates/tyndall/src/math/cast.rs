@@ -5,7 +5,17 @@
 #[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "`as` saturates, which is what is documented")]
 pub fn floor_i32(x: f32) -> i32 {
-    x.floor() as i32
+    // Without SSE4.1, which a portable build cannot assume, `f32::floor` is a function call.
+    let towards_zero = x as i32;
+    towards_zero.saturating_sub(i32::from(x < towards_zero as f32))
+}
+
+/// Cuts the fraction off; saturates at the ends of `i32`; NaN becomes 0.
+#[inline]
+#[must_use]
+#[expect(clippy::cast_possible_truncation, reason = "`as` saturates, which is what is documented")]
+pub fn truncate(x: f32) -> i32 {
+    x as i32
 }
 
 /// Cuts the fraction of a non-negative number off; negative numbers and NaN become 0.
@@ -40,4 +50,19 @@ pub fn low_u32(x: u64) -> u32 {
 #[must_use]
 pub fn fit_u32(x: usize) -> u32 {
     u32::try_from(x).expect("index within 32 bits")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn floors_of_any_number() {
+        for (x, floor) in
+            [(1.5, 1), (-1.5, -2), (-2.0, -2), (0.0, 0), (-0.0, 0), (-1e-9, -1), (16_777_216.0, 16_777_216)]
+        {
+            assert_eq!(floor_i32(x), floor, "{x}");
+        }
+        assert_eq!((floor_i32(f32::NAN), floor_i32(1e30), floor_i32(-1e30)), (0, i32::MAX, i32::MIN));
+    }
 }

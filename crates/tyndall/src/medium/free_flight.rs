@@ -21,6 +21,8 @@ pub struct Collision {
     pub t: f32,
     /// Where, in index space.
     pub place: Vec3,
+    /// The data value there.
+    pub value: f32,
 }
 
 impl Medium {
@@ -41,9 +43,10 @@ impl Medium {
                 t += depth / majorant;
                 let place = track.at(t);
                 let level = stream.uniform() * cell.most;
+                let value = self.volume.value(place);
                 // Below the smallest opacity the collision is real whatever stands there.
-                if level < cell.least || level < self.transfer.opacity(self.volume.value(place)) {
-                    return ControlFlow::Break(Collision { t, place });
+                if level < cell.least || level < self.transfer.opacity(value) {
+                    return ControlFlow::Break(Collision { t, place, value });
                 }
                 depth = stream.exponential();
             }

@@ -5,6 +5,7 @@
 mod clip;
 mod free_flight;
 mod majorants;
+mod reach;
 
 pub use clip::{Clip, ClipShape};
 pub use free_flight::Collision;

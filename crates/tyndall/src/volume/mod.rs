@@ -18,6 +18,7 @@ pub use statistics::Histogram;
 pub use voxels::{Voxel, Voxels};
 
 use crate::math::{Vec3, cast};
+use interpolation::Lattice;
 use std::sync::Arc;
 use voxels::with_voxels;
 
@@ -75,6 +76,7 @@ pub struct Volume {
     robust_range: [f64; 2],
     non_finite: u64,
     bricks: Arc<Bricks>,
+    lattice: Lattice,
     slope: f32,
     intercept: f32,
 }
@@ -102,6 +104,7 @@ impl Volume {
         let robust_range = statistics::robust_range(&voxels, values, value_range);
         let bricks = Bricks::new(&grid, &voxels, values, Bricks::CELL);
         Ok(Self {
+            lattice: Lattice::new(grid.dims()),
             grid,
             voxels: Arc::new(voxels),
             values,
@@ -201,14 +204,9 @@ impl Volume {
     #[inline]
     #[must_use]
     pub fn value(&self, p: Vec3) -> f32 {
-        let dims = self.grid.dims();
         let stored = match self.interpolation {
-            Interpolation::Linear => {
-                with_voxels!(&*self.voxels, data => interpolation::linear(data, dims, p))
-            }
-            Interpolation::Nearest => {
-                with_voxels!(&*self.voxels, data => interpolation::nearest(data, dims, p))
-            }
+            Interpolation::Linear => with_voxels!(&*self.voxels, data => self.lattice.linear(data, p)),
+            Interpolation::Nearest => with_voxels!(&*self.voxels, data => self.lattice.nearest(data, p)),
         };
         self.slope * stored + self.intercept
     }
