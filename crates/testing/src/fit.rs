@@ -6,7 +6,7 @@ use std::fmt;
 use thiserror::Error;
 
 /// Cells that expect fewer samples are pooled: below about five, counts are too far from normally distributed for
-/// the statistic to follow the chi-square distribution [Cochran54].
+/// the statistic to follow the chi-square distribution \[Cochran54\].
 const LEAST_EXPECTED: f64 = 5.0;
 
 /// By how much shares may miss their total: room for quadrature and single precision, far below a lost factor.

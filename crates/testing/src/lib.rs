@@ -2,7 +2,7 @@
 //!
 //! A Monte Carlo estimator is a random variable, so "equal within a tolerance" is not a test of it: a tolerance
 //! wide enough for the noise hides the bug, a narrow one fails by chance. The tests here ask instead how likely
-//! the observed numbers would be if the code were right [Subr07], and reject at a chosen [`SIGNIFICANCE`].
+//! the observed numbers would be if the code were right \[Subr07\], and reject at a chosen [`SIGNIFICANCE`].
 //!
 //! | to test | use |
 //! | --- | --- |

@@ -189,7 +189,7 @@ impl Comparison<'_> {
         total(self.image) / total(self.reference)
     }
 
-    /// Mean over pixels and channels of squared difference over squared reference [Rousselle11], where the reference
+    /// Mean over pixels and channels of squared difference over squared reference \[Rousselle11\], where the reference
     /// counts as no darker than a tenth of its own mean. Contains the noise of both.
     #[must_use]
     pub fn relative_mse(&self) -> f64 {

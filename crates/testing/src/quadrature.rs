@@ -1,7 +1,7 @@
 //! Adaptive quadrature in one and two dimensions, for the known answers that estimators are tested against.
 //!
 //! Each piece is integrated by the 15-point Kronrod rule; its difference from the 7-point Gauss rule inside bounds
-//! the error, and the worst piece is halved until all errors together are small enough [Piessens83]. Kinks, jumps
+//! the error, and the worst piece is halved until all errors together are small enough \[Piessens83\]. Kinks, jumps
 //! and narrow peaks are met by ever smaller pieces. A peak that falls between all points of the first rule is
 //! not seen: split the range where a peak is known to be.
 

@@ -9,7 +9,7 @@ use std::f64::consts::SQRT_2;
 /// the tests sharp and such accidents rare.
 pub const SIGNIFICANCE: f64 = 0.01;
 
-/// Significance of each of `tests` independent tests such that all together keep [`SIGNIFICANCE`] [Sidak67].
+/// Significance of each of `tests` independent tests such that all together keep [`SIGNIFICANCE`] \[Sidak67\].
 ///
 /// # Panics
 /// If there is no test.

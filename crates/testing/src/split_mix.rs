@@ -1,6 +1,6 @@
 //! A source of uniform numbers for tests.
 
-/// The `SplitMix64` generator [Steele14]: small, sound enough for the tests here, and the same on every machine.
+/// The `SplitMix64` generator \[Steele14\]: small, sound enough for the tests here, and the same on every machine.
 ///
 /// Of its own, so that a test of a renderer's sampler does not lean on that renderer's numbers.
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@ use crate::ROUNDING;
 use crate::significance::{sidak, two_sided};
 use std::fmt;
 
-/// Running mean and variance of numbers as they come [Welford62].
+/// Running mean and variance of numbers as they come \[Welford62\].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mean {
     count: u64,
@@ -22,7 +22,7 @@ impl Mean {
         self.scatter += distance * (x - self.mean);
     }
 
-    /// Takes in all numbers that another one has seen [Chan83].
+    /// Takes in all numbers that another one has seen \[Chan83\].
     pub fn merge(&mut self, other: &Self) {
         let count = self.count + other.count;
         if count == 0 {

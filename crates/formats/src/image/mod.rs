@@ -106,11 +106,11 @@ pub fn write(
     atomic::replace(path, &bytes).map_err(|source| ImageError::unwritable(path, source))
 }
 
-/// Tells before a long render whether [`write`] could put a picture there: the kind is known, the folder
+/// Tells before a long render whether [`write()`] could put a picture there: the kind is known, the folder
 /// is there and takes files, and nothing but a file stands in the place.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn check_destination(path: &Path) -> Result<(), ImageError> {
     if Kind::of_extension(path).is_none() {
         return Err(ImageError::extension(path, EXTENSIONS));

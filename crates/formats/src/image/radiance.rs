@@ -1,4 +1,4 @@
-//! Radiance pictures (.hdr, .pic): three mantissas and one exponent per pixel, run-length coded [Ward91].
+//! Radiance pictures (.hdr, .pic): three mantissas and one exponent per pixel, run-length coded \[Ward91\].
 
 use std::io::{BufRead, Read};
 
@@ -10,7 +10,7 @@ use super::map::{Map, MapFailure};
 const HEADER_LIMIT: u64 = 1 << 20;
 /// Most pixels that a byte of the file stands for: a run of 255 in 4 bytes.
 const PIXELS_PER_BYTE: u64 = 64;
-/// Widths that the newer run-length coding, by channel, can tell [Ward91].
+/// Widths that the newer run-length coding, by channel, can tell \[Ward91\].
 const BY_CHANNEL: std::ops::RangeInclusive<usize> = 8..=0x7FFF;
 
 type Rgbe = [u8; 4];

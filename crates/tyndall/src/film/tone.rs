@@ -12,14 +12,14 @@ use crate::math::Rgb;
 )]
 #[serde(rename_all = "lowercase")]
 pub enum ToneCurve {
-    /// `AgX`, the base look, with highlights that lose their colour as film does [Sobotka22, Wrensch23].
+    /// `AgX`, the base look, with highlights that lose their colour as film does \[Sobotka22, Wrensch23\].
     #[default]
     Agx,
     /// None: clipped at 1, then encoded as IEC 61966-2-1 says.
     Linear,
-    /// Luminance `L` becomes `L / (1 + L)` [Reinhard02, eq. 3]; saturated channels clip.
+    /// Luminance `L` becomes `L / (1 + L)` \[Reinhard02, eq. 3\]; saturated channels clip.
     Reinhard,
-    /// A rational fit of the ACES reference transform, each channel by itself [Narkowicz16].
+    /// A rational fit of the ACES reference transform, each channel by itself \[Narkowicz16\].
     Aces,
 }
 
@@ -66,24 +66,24 @@ fn clip(x: f32, high: f32) -> f32 {
     if x > 0.0 { x.min(high) } else { 0.0 }
 }
 
-/// [Narkowicz16]: five numbers fitted to the reference and output device transforms.
+/// \[Narkowicz16\]: five numbers fitted to the reference and output device transforms.
 fn aces(x: f32) -> f32 {
     (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)
 }
 
 type Matrix = [[f32; 3]; 3];
 
-/// Scene stops that `AgX` spans, as log2 of the linear value [Sobotka22].
+/// Scene stops that `AgX` spans, as log2 of the linear value \[Sobotka22\].
 const AGX_STOPS: [f32; 2] = [-12.473_93, 4.026_069];
 
-/// Moves pure colours towards white, so that bright ones desaturate instead of clipping [Wrensch23].
+/// Moves pure colours towards white, so that bright ones desaturate instead of clipping \[Wrensch23\].
 const AGX_INSET: Matrix = rows_to_one([
     [0.842_479_06, 0.078_433_6, 0.079_223_745],
     [0.042_328_242, 0.878_468_64, 0.079_166_13],
     [0.042_375_655, 0.078_433_6, 0.879_143],
 ]);
 
-/// The way back, after the contrast curve [Wrensch23].
+/// The way back, after the contrast curve \[Wrensch23\].
 const AGX_OUTSET: Matrix = rows_to_one([
     [1.196_879, -0.098_020_88, -0.099_029_74],
     [-0.052_896_85, 1.151_903_1, -0.098_961_18],
@@ -102,7 +102,7 @@ const fn rows_to_one(rows: Matrix) -> Matrix {
     result
 }
 
-/// [Wrensch23]'s fit of the base look of [Sobotka22]; the curve's output is meant for the display as it is.
+/// \[Wrensch23\]'s fit of the base look of \[Sobotka22\]; the curve's output is meant for the display as it is.
 fn agx(scene: Rgb) -> Rgb {
     let [low, high] = AGX_STOPS;
     // log2 of zero is minus infinity, which the clamp takes to the bottom of the range.
@@ -110,7 +110,7 @@ fn agx(scene: Rgb) -> Rgb {
     multiply(AGX_OUTSET, log.map(agx_contrast)).map(|x| x.clamp(0.0, 1.0))
 }
 
-/// The sigmoid over the log range, as a polynomial of degree 6 [Wrensch23].
+/// The sigmoid over the log range, as a polynomial of degree 6 \[Wrensch23\].
 fn agx_contrast(x: f32) -> f32 {
     let higher = ((15.5 * x - 40.14) * x + 31.96) * x - 6.868;
     ((higher * x + 0.429_8) * x + 0.119_1) * x - 0.002_32

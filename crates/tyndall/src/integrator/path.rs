@@ -1,8 +1,8 @@
 //! Unbiased Monte Carlo: one path from the camera per sample, by the scheme of Exposure Render as
-//! [Khlebnikov14, sec. 3] tells it, extended to any order of scattering.
+//! \[Khlebnikov14, sec. 3\] tells it, extended to any order of scattering.
 //!
 //! A path flies to a collision, asks one light for what it sends there, scatters, and flies on. Light
-//! found by the two ways is weighed by the balance heuristic [Veach97]. Paths have any length and no stack.
+//! found by the two ways is weighed by the balance heuristic \[Veach97\]. Paths have any length and no stack.
 
 use crate::film::PixelSample;
 use crate::light::LightSample;

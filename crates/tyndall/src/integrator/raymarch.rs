@@ -101,7 +101,7 @@ fn hammersley(i: u32, n: u32) -> [f32; 2] {
     [(i as f32 + 0.5) / n as f32, radical_inverse + 0.5 / n as f32 % 1.0]
 }
 
-/// The `i`-th point of the R2 sequence [Roberts18], which begins in the middle of the unit square.
+/// The `i`-th point of the R2 sequence \[Roberts18\], which begins in the middle of the unit square.
 fn spread(i: u32) -> [f32; 2] {
     // Inverse powers of the plastic number, as fractions of 2^32, so that no bit is lost for large i.
     let at = |step: u32| (i.wrapping_mul(step).wrapping_add(1 << 31) >> 8) as f32 / (1 << 24) as f32;

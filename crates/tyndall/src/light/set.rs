@@ -70,7 +70,7 @@ impl LightSet {
     }
 
     /// Light that a scattered ray gathers by passing lights nearer than `end`, each weighted against
-    /// [`Self::sample`] by the balance heuristic [Veach97]; `pdf` is the density of the ray's direction.
+    /// [`Self::sample`] by the balance heuristic \[Veach97\]; `pdf` is the density of the ray's direction.
     #[inline]
     #[must_use]
     pub fn passed(&self, ray: &Ray, end: f32, pdf: f32) -> Rgb {

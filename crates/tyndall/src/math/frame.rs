@@ -14,7 +14,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Builds a frame around a unit vector without a branch on its direction [Duff17].
+    /// Builds a frame around a unit vector without a branch on its direction \[Duff17\].
     #[inline]
     #[must_use]
     pub fn around(w: Vec3) -> Self {

@@ -27,7 +27,7 @@ pub struct Collision {
 
 impl Medium {
     /// Flies to the next real collision, or out of the medium (`None`): delta tracking
-    /// [Woodcock65] with local majorants [Yue10].
+    /// \[Woodcock65\] with local majorants \[Yue10\].
     ///
     /// `first` is the optical depth to the first tentative collision, exponentially distributed; the
     /// numbers of later ones come from `stream`.
@@ -56,7 +56,7 @@ impl Medium {
         end.break_value()
     }
 
-    /// An unbiased estimate of the transmittance along a track: residual ratio tracking [Novak14], in
+    /// An unbiased estimate of the transmittance along a track: residual ratio tracking \[Novak14\], in
     /// which each cell's smallest extinction is the control and is integrated exactly.
     #[inline]
     #[must_use]

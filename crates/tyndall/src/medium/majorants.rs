@@ -1,4 +1,4 @@
-//! Opacity bounds per cell and the walk of a ray through the cells (3D-DDA [Amanatides87]).
+//! Opacity bounds per cell and the walk of a ray through the cells (3D-DDA \[Amanatides87\]).
 
 use super::{Track, reach};
 use crate::math::cast;

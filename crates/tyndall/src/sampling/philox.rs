@@ -1,4 +1,4 @@
-//! The Philox4x32-10 bijection [Salmon11]: four words of counter and two of key to four random words.
+//! The Philox4x32-10 bijection \[Salmon11\]: four words of counter and two of key to four random words.
 
 /// Four random words for a counter under a key.
 #[inline]

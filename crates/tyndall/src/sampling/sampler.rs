@@ -34,7 +34,7 @@ impl BounceSample {
     }
 }
 
-/// Owen-scrambled Sobol points [Burley20] per pixel, and a [`Stream`] for what has no fixed number of draws.
+/// Owen-scrambled Sobol points \[Burley20\] per pixel, and a [`Stream`] for what has no fixed number of draws.
 #[derive(Clone, Debug)]
 pub struct PathSampler {
     index: u32,

@@ -26,7 +26,7 @@ pub fn cone(u: [f32; 2], cos_max: f32) -> Vec3 {
     around_z(1.0 - u[0] * (1.0 - cos_max), u[1])
 }
 
-/// Uniform point on the unit disk, by the concentric map [Shirley97]; density `1 / pi`.
+/// Uniform point on the unit disk, by the concentric map \[Shirley97\]; density `1 / pi`.
 #[inline]
 #[must_use]
 pub fn disk(u: [f32; 2]) -> [f32; 2] {

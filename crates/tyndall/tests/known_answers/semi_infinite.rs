@@ -1,4 +1,4 @@
-//! The semi-infinite isotropic medium [Chandrasekhar60], as radiances.
+//! The semi-infinite isotropic medium \[Chandrasekhar60\], as radiances.
 
 use crate::scenes::{henyey_greenstein, radiance, slab};
 use std::f64::consts::PI;

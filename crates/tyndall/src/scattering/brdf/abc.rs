@@ -1,4 +1,4 @@
-//! The ABC microfacet model of Löw, Kronander, Ynnerman and Unger [Low12].
+//! The ABC microfacet model of Löw, Kronander, Ynnerman and Unger \[Low12\].
 
 use super::coat::Half;
 use crate::math::cast;
@@ -14,14 +14,14 @@ pub enum BrdfError {
     C(f32),
 }
 
-/// Microfacets distributed by `D(h) = A / (1 + B (1 - n . h))^C` [Low12, eq. 15], where
+/// Microfacets distributed by `D(h) = A / (1 + B (1 - n . h))^C` \[Low12, eq. 15\], where
 /// `f_r = base + F(k . h) D(h) G / (4 (n . w_in) (n . w_out))`.
 ///
 /// B sets how narrow the lobe is and C how slowly it falls off. The source fits A per material and lets
 /// it take any scale; here A follows from `integral of D(h) (n . h) dh = 1`, which makes `D` a
 /// distribution of facets, and the factor 1/4 of mirroring is written out. The source's diffuse
-/// term is constant; here it is the coupled one of [Ashikhmin00], since a constant one beside a Fresnel term
-/// reflects more than it gets at grazing. With the V-groove `G` [Torrance67] both together are
+/// term is constant; here it is the coupled one of \[Ashikhmin00\], since a constant one beside a Fresnel term
+/// reflects more than it gets at grazing. With the V-groove `G` \[Torrance67\] both together are
 /// reciprocal and reflect at most 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Abc {

@@ -1,4 +1,4 @@
-//! The gloss of Ashikhmin and Shirley's anisotropic Phong model, used isotropically [Ashikhmin00].
+//! The gloss of Ashikhmin and Shirley's anisotropic Phong model, used isotropically \[Ashikhmin00\].
 
 use super::coat::Half;
 use std::f32::consts::TAU;
@@ -20,20 +20,20 @@ impl AshikhminShirley {
         Self { exponent: 2.0 / (r2 * r2) - 2.0 }
     }
 
-    /// The specular term without its Fresnel factor, both exponents equal [Ashikhmin00, eq. 4]:
+    /// The specular term without its Fresnel factor, both exponents equal \[Ashikhmin00, eq. 4\]:
     /// `(exponent + 1) / (8 pi) (n . h)^exponent / ((k . h) max(cos_in, cos_out))`.
     #[inline]
     pub fn eval(self, half: Half, larger_cos: f32) -> f32 {
         self.pdf(half) / larger_cos
     }
 
-    /// Draws `1 - n . h` of a facet [Ashikhmin00, eq. 10].
+    /// Draws `1 - n . h` of a facet \[Ashikhmin00, eq. 10\].
     #[inline]
     pub fn draw_drop(self, u: f32) -> f32 {
         -((-u).ln_1p() / (self.exponent + 1.0)).exp_m1()
     }
 
-    /// Density of the mirrored direction, \[1/sr\] [Ashikhmin00, eq. 8].
+    /// Density of the mirrored direction, \[1/sr\] \[Ashikhmin00, eq. 8\].
     #[inline]
     pub fn pdf(self, half: Half) -> f32 {
         (self.exponent + 1.0) / TAU * self.phong(half.drop) / (4.0 * half.cos)

@@ -26,14 +26,14 @@ impl Half {
     }
 }
 
-/// Reflectance of a facet seen at a cosine, from its reflectance at normal incidence [Schlick94].
+/// Reflectance of a facet seen at a cosine, from its reflectance at normal incidence \[Schlick94\].
 #[inline]
 pub fn fresnel(at_normal: Rgb, cos: f32) -> Rgb {
     let rise = fifth(1.0 - cos);
     at_normal.map(|r| r + (1.0 - r) * rise)
 }
 
-/// The diffuse term under a glossy coat [Ashikhmin00, eq. 5]:
+/// The diffuse term under a glossy coat \[Ashikhmin00, eq. 5\]:
 /// `28 Rd / (23 pi) (1 - Rs) (1 - (1 - cos_in/2)^5) (1 - (1 - cos_out/2)^5)`.
 /// It fades towards grazing, where the coat reflects all, and so the sum keeps within 1.
 #[inline]

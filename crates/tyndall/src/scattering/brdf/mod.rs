@@ -34,9 +34,9 @@ pub enum Brdf {
     /// `albedo / pi`.
     #[default]
     Lambert,
-    /// Phong lobes that keep reciprocity and energy over a matching diffuse base [Ashikhmin00].
+    /// Phong lobes that keep reciprocity and energy over a matching diffuse base \[Ashikhmin00\].
     AshikhminShirley,
-    /// Microfacets whose distribution fits measured glossy surfaces [Low12].
+    /// Microfacets whose distribution fits measured glossy surfaces \[Low12\].
     Abc(Abc),
 }
 

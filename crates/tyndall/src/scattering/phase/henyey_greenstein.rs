@@ -1,11 +1,11 @@
-//! The Henyey-Greenstein phase function [HG41].
+//! The Henyey-Greenstein phase function \[HG41\].
 
 use super::PhaseError;
 use crate::math::Vec3;
 use crate::scattering::deflect;
 use std::f32::consts::PI;
 
-/// One lobe, set by its mean cosine `g` [HG41]:
+/// One lobe, set by its mean cosine `g` \[HG41\]:
 /// `(1 - g^2) / (4 pi (1 + g^2 - 2 g cos_theta)^(3/2))`; g > 0 is forward.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HenyeyGreenstein {

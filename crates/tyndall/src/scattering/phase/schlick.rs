@@ -1,11 +1,11 @@
-//! Schlick's rational phase function [Blasi93].
+//! Schlick's rational phase function \[Blasi93\].
 
 use super::PhaseError;
 use crate::math::{Vec3, cast};
 use crate::scattering::deflect;
 use std::f32::consts::PI;
 
-/// A lobe without a root, close to Henyey-Greenstein's [Blasi93]:
+/// A lobe without a root, close to Henyey-Greenstein's \[Blasi93\]:
 /// `(1 - k^2) / (4 pi (1 - k cos_theta)^2)`; k > 0 is forward.
 ///
 /// Texts that write `1 + k cos_theta` take both directions as leaving the point; here they follow the light.

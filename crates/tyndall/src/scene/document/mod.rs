@@ -1,9 +1,9 @@
 //! The scene document: the text, TOML or JSON, in which users describe a scene, and the edits that change it.
 //!
-//! A document is first a [`Value`]: that is what edits ([`apply`], [`set`]) work on. [`Document::from_value`] checks it
-//! against the [`schema`], which is derived from the types here, then for what a schema cannot say, and so makes a
-//! [`Document`]: every key there or at its default, every number in its range. It mirrors the file; what is still open,
-//! such as an automatic camera, is decided when the scene is built, since that needs the volume.
+//! A document is first a [`Value`]: that is what edits ([`apply`], [`set()`]) work on. [`Document::from_value`] checks
+//! it against the [`schema()`], which is derived from the types here, then for what a schema cannot say, and so makes
+//! a [`Document`]: every key there or at its default, every number in its range. It mirrors the file; what is still
+//! open, such as an automatic camera, is decided when the scene is built, since that needs the volume.
 //!
 //! ```
 //! use tyndall::scene::document::{Document, apply};

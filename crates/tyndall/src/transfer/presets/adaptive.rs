@@ -9,7 +9,7 @@ const BRIGHT: [f32; 3] = [0.95, 0.88, 0.80];
 const STONE: [f32; 3] = [0.90, 0.85, 0.76];
 const WHITE: [f32; 3] = [0.97, 0.97, 0.97];
 
-/// The threshold between two classes of values by Otsu's criterion [Otsu79], as a share of the range:
+/// The threshold between two classes of values by Otsu's criterion \[Otsu79\], as a share of the range:
 /// the one that separates the classes' means most, weighed by their sizes.
 fn otsu(profile: &Profile) -> f64 {
     let counts = &profile.histogram.counts;

@@ -111,7 +111,7 @@ fn matter(value: f32, opacity: f32, albedo: [f32; 3], surface: f32) -> Point {
     Point { value, optics: Optics { opacity, albedo: Rgb::from(albedo), surface, ..Optics::default() } }
 }
 
-/// Fig. 4 of [Jonsson12]: white walls with one red and one green, thin bluish air.
+/// Fig. 4 of \[Jonsson12\]: white walls with one red and one green, thin bluish air.
 fn cornell_box(_: &Profile) -> Vec<Point> {
     let looks: [(f32, [f32; 3]); 7] = [
         (0.0008, [0.80, 0.88, 0.98]),

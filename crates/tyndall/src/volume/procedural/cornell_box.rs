@@ -1,4 +1,4 @@
-//! The Cornell box of [Jonsson12, fig. 4]: one data value per material, so that an edit of one is local.
+//! The Cornell box of \[Jonsson12, fig. 4\]: one data value per material, so that an edit of one is local.
 
 use crate::math::Vec3;
 

@@ -1,4 +1,4 @@
-//! The Marschner-Lobb test signal [Marschner94]: most of its energy just below the Nyquist limit of a 40^3 grid.
+//! The Marschner-Lobb test signal \[Marschner94\]: most of its energy just below the Nyquist limit of a 40^3 grid.
 
 use crate::math::Vec3;
 use std::f32::consts::PI;

@@ -22,12 +22,12 @@ pub enum Kind {
     Sphere,
     /// Eight shells of equal width inside the largest ball: 1/8 in the outermost, 1 in the innermost, 0 outside.
     Shells,
-    /// The test signal of [Marschner94] with f_M = 6 and alpha = 0.25.
+    /// The test signal of \[Marschner94\] with f_M = 6 and alpha = 0.25.
     MarschnerLobb,
     /// Seeded fractal noise with a spherical fall-off.
     Cloud,
     /// A room with coloured walls, a sphere, a block, a transparent box and thin matter in the air
-    /// [Jonsson12, fig. 4]; one value per material, see [`MATERIALS`].
+    /// \[Jonsson12, fig. 4\]; one value per material, see [`MATERIALS`].
     CornellBox,
 }
 
