@@ -45,15 +45,15 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     input.override_with(options)?;
     let (document, assets, source) = threads.install(|| input.load(&options.input))?;
     let load_s = stages.end("load");
-    if !options.quiet {
-        for text in &source.notes {
-            drop(writeln!(std::io::stderr(), "tyndall: note: {text}"));
-        }
-    }
     refuse_film_that_does_not_fit(document.film.size)?;
     let scene = threads
         .install(|| Scene::build(&document, &assets))
         .map_err(|e| Failure::input(format!("{}: {e}", options.input.display())))?;
+    if !options.quiet {
+        for text in source.notes.iter().map(String::as_str).chain(scene.notes()) {
+            drop(writeln!(std::io::stderr(), "tyndall: note: {text}"));
+        }
+    }
     let mut session = Session::new(scene, threads.clone());
     let prepared = stages.end("prepare");
     note(&format!(

@@ -1,4 +1,4 @@
-//! How far a cell's neighbourhood is all alike: a chessboard distance transform [Rosenfeld66].
+//! How far a cell's neighbourhood is all alike: a chessboard distance transform \[Rosenfeld66\].
 
 /// Per cell the largest number `r`, up to 255, such that every cell of the grid within `r` to each side has
 /// the same opacity, smallest as largest; 0 for a cell that varies inside.

@@ -76,6 +76,23 @@ impl IntegratorKind {
 }
 
 impl Scene {
+    /// What the chosen method leaves out of this scene, a sentence each.
+    #[must_use]
+    pub fn notes(&self) -> Vec<&'static str> {
+        let marching = matches!(self.render.integrator, IntegratorKind::RayMarch { .. });
+        let bends = self.medium.transfer().points().iter().any(|p| p.optics.ior != 1.0);
+        let mut notes = Vec::new();
+        if marching && self.medium.transfer().emits() {
+            notes.push(
+                "`raymarch` leaves out the light that glowing matter sends to other matter; `path` has it",
+            );
+        }
+        if bends {
+            notes.push("the refractive index is ignored: light goes straight");
+        }
+        notes
+    }
+
     /// Radiance of a camera ray that meets nothing.
     #[must_use]
     pub fn behind(&self, direction: Vec3) -> Rgb {

@@ -2,6 +2,12 @@
 //!
 //! Bugs that were planted to see these tests fail are listed in CORRECTNESS.md.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    reason = "constants of known size go from double to single precision"
+)]
+#![expect(clippy::unwrap_used, reason = "what the tests build is right by construction")]
+
 mod emission;
 mod furnace;
 mod lights;

@@ -149,7 +149,7 @@ fn what_is_clipped_is_vacuum() {
 #[test]
 fn skipping_changes_nothing() {
     let n = 50;
-    let value = |p: [usize; 3]| if (p[0] / 11 + p[1] / 7 + p[2] / 13) % 3 == 0 { 0.7 } else { 0.0 };
+    let value = |p: [usize; 3]| if (p[0] / 11 + p[1] / 7 + p[2] / 13).is_multiple_of(3) { 0.7 } else { 0.0 };
     let scene = |cell| {
         let setup = Setup::new(volume([n; 3], [2.0; 3], value), ramp(), 3.0);
         Setup { majorant_cell: cell, ..setup }.scene()

@@ -123,7 +123,8 @@ mod tests {
     #[test]
     fn the_threshold_falls_between_two_humps() {
         let hump = |i: i32, at: i32, n: f64| n * (-f64::from((i - at).pow(2)) / 200.0).exp();
-        let counts = (0..256).map(|i| (hump(i, 20, 9e5) + hump(i, 150, 1e5)) as u64).collect();
+        let count = |i| cast::index(cast::single(hump(i, 20, 9e5) + hump(i, 150, 1e5))) as u64;
+        let counts = (0..256).map(count).collect();
         let profile = Profile { histogram: Histogram { range: [0.0, 1.0], counts } };
         let t = otsu(&profile);
         assert!((0.2..0.5).contains(&t), "{t}");
