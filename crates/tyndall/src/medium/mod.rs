@@ -188,3 +188,35 @@ impl Medium {
         (Rgb::WHITE - optics.albedo) * optics.emission
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::transfer::Point;
+    use crate::volume::{Grid, ValueMap, Voxels};
+
+    #[test]
+    fn an_edge_of_the_data_is_a_surface_as_far_as_its_gradient_says() {
+        let grid = Grid::centred([10, 2, 2], [0.5, 1.0, 0.25]).unwrap();
+        let voxels = Voxels::U8((0..40).map(|i| i % 10).collect());
+        let volume = Arc::new(Volume::new(grid, voxels, ValueMap::IDENTITY).unwrap());
+        let optics = Optics { surface: 0.7, ..Optics::default() };
+        let transfer = Arc::new(TransferFunction::new(vec![Point { value: 0.0, optics }]).unwrap());
+        let settings = MediumSettings {
+            density: 1.0,
+            phase: Phase::Isotropic,
+            brdf: Brdf::Lambert,
+            gradient_factor: 3.0,
+            clip: Vec::new(),
+            majorant_cell: 8,
+        };
+        let medium = Medium::new(volume, transfer, &settings);
+        let here = Vec3::new(4.25, 0.5, 0.5);
+        // A slope of 2 per world unit, a voxel of 1/2, values from 0 to 9.
+        let event = medium.event(here, &optics);
+        assert!((event.q - 0.7 * (1.0 - (-3.0_f32 * 2.0 * 0.5 / 9.0).exp())).abs() < 1e-6, "{}", event.q);
+        assert_eq!(event.normal, Some(Vec3::X));
+        let even = medium.event(here, &Optics { surface: 0.0, ..optics });
+        assert_eq!((even.q, even.normal), (0.0, None));
+    }
+}

@@ -220,3 +220,33 @@ impl Volume {
         self.grid.gradient_to_world(Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_gradient_of_an_even_slope_is_that_slope_in_the_world() {
+        let (s, c) = 0.4_f64.sin_cos();
+        let direction = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]];
+        let grid = Grid::new([6, 5, 4], [0.5, 1.0, 2.0], direction, [1.0, 2.0, 3.0], Space::Plain).unwrap();
+        let slope = Vec3::new(3.0, -1.0, 0.5);
+        let place = |i: u8| Vec3::new(f32::from(i % 6), f32::from(i / 6 % 5), f32::from(i / 30));
+        let data = (0..120).map(|i| slope.dot(grid.index_to_world(place(i)))).collect();
+        let values = ValueMap { slope: 2.0, intercept: -7.0 };
+        let volume = Volume::new(grid, Voxels::F32(data), values).unwrap();
+        for p in [Vec3::new(2.0, 2.0, 1.0), Vec3::new(1.3, 3.4, 2.5)] {
+            let found = volume.gradient(p);
+            assert!((found - slope * 2.0).length() < 1e-4, "{found} at {p}");
+        }
+    }
+
+    #[test]
+    fn the_gradient_sees_one_voxel_and_no_further() {
+        let grid = Grid::centred([6, 1, 1], [0.5, 1.0, 1.0]).unwrap();
+        let volume = Volume::new(grid, Voxels::U8(vec![0, 0, 0, 1, 1, 1]), ValueMap::IDENTITY).unwrap();
+        // Per world unit, of which a voxel is half: the whole jump midway, half of it at a centre.
+        let found = [1.5, 2.0, 2.5, 3.5].map(|x| volume.gradient(Vec3::X * x));
+        assert_eq!(found, [0.0, 1.0, 2.0, 0.0].map(|g| Vec3::X * g));
+    }
+}
