@@ -3,8 +3,11 @@
 use crate::scenes::{Setup, blocks, radiance};
 use std::f64::consts::PI;
 use tyndall::integrator::RayMarch;
+use tyndall::light::{Environment, Light};
 use tyndall::math::{Ray, Rgb, Vec3};
+use tyndall::medium::ClipShape;
 use tyndall::transfer::{Optics, Point};
+use tyndall_testing::{Mean, ZTest};
 
 /// Vacuum at 0, glowing black matter at 1, dark scattering matter at 2; flat in between.
 fn three_materials(glow: f32, glow_opacity: f32, slab_opacity: f32, slab_albedo: f32) -> Vec<Point> {
@@ -107,6 +110,39 @@ fn a_glowing_block_lights_a_dark_slab() {
         let expected = by_quadrature(f64::from(x), 0.125, 1.0);
         radiance(&scene, 32_000_000, |_| ray).against(expected).assert_within(3.0, 1e-3);
     }
+}
+
+/// Glowing matter that is cut away lights nothing.
+#[test]
+fn a_clipped_block_lights_nothing() {
+    let value = |p: [usize; 3]| if p[2] < 4 { 2.0 } else { 1.0 };
+    let seen = |clip| {
+        let volume = blocks([16; 3], [2.0; 3], value);
+        let setup = Setup::new(volume, three_materials(5.0, 0.1, 0.5, 0.6), 4.0);
+        let scene = Setup { clip, max_scatter: 1, ..setup }.scene();
+        radiance(&scene, 10_000, |_| Ray::new(Vec3::new(0.1, 0.2, -3.0), Vec3::Z)).mean()
+    };
+    // The cut leaves the dark quarter below z = -1/2 and not all of that.
+    let cut = ClipShape::Plane { point: Vec3::Z * -0.6, normal: Vec3::Z };
+    assert!(seen(Vec::new()) > 0.01);
+    assert_eq!(seen(vec![cut]), 0.0);
+}
+
+/// Light of matter and of lamps together is the sum of both alone.
+#[test]
+fn glow_and_lamps_add_up() {
+    let value = |p: [usize; 3]| if p[2] < 8 { 2.0 } else { 1.0 };
+    let seen = |seed, glow, sky: f32| {
+        let points = three_materials(glow, 0.25, 0.25, 0.9);
+        let setup = Setup::new(blocks([16; 3], [2.0; 3], value), points, 4.0);
+        let lights = vec![Light::Environment(Environment::constant(Rgb::splat(sky), false))];
+        let scene = Setup { seed, lights, max_scatter: 2, ..setup }.scene();
+        radiance(&scene, 4_000_000, |_| Ray::new(Vec3::new(0.1, 0.2, -3.0), Vec3::Z))
+    };
+    let (glow, lamp, both) = (seen(1, 2.0, 0.0), seen(2, 0.0, 0.5), seen(3, 2.0, 0.5));
+    let variance = [glow, lamp, both].iter().map(Mean::variance_of_mean).sum::<f64>();
+    assert!(variance.sqrt() < 1e-3 * both.mean(), "noise {} of {}", variance.sqrt(), both.mean());
+    ZTest::new(both.mean(), variance, glow.mean() + lamp.mean()).assert();
 }
 
 /// Where glowing and scattering matter are the same, a point may be lit by its own neighbourhood; the

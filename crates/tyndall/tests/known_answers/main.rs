@@ -8,6 +8,7 @@
 )]
 #![expect(clippy::unwrap_used, reason = "what the tests build is right by construction")]
 
+mod coverage;
 mod emission;
 mod furnace;
 mod lights;

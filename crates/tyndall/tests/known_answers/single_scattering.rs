@@ -1,9 +1,9 @@
 //! Single scattering in a slab by its closed form: `raymarch`, and `path` with one scattering.
 
-use crate::scenes::{henyey_greenstein, radiance, slab};
+use crate::scenes::{Setup, henyey_greenstein, matter, radiance, slab, volume};
 use std::f64::consts::PI;
 use tyndall::integrator::RayMarch;
-use tyndall::light::{Directional, Light};
+use tyndall::light::{Directional, Disk, Environment, Light, PointLight, Rect, SphereLight};
 use tyndall::math::{Ray, Rgb, Vec3};
 use tyndall::scene::Scene;
 
@@ -70,5 +70,37 @@ fn raymarch_and_the_order_of_its_step_error() {
         // 8 times finer: about 64 times nearer, and single precision adds some last places.
         assert!(fine.abs() < coarse.abs() / 30.0 + 2e-5, "error {coarse:e} at 1/32, {fine:e} at 1/256");
         assert!(coarse.abs() < 0.02 && coarse.abs() > 1e-6, "error {coarse:e} at 1/32");
+    }
+}
+
+/// One scattering of every light that has an extent or stands in the matter, by both methods.
+#[test]
+fn both_methods_agree_under_every_light() {
+    let at = Vec3::new(0.3, 0.4, 0.2);
+    let radiance_of = Rgb::splat(2.0);
+    let lights = [
+        ("sun", Light::Directional(Directional::new(-at, radiance_of, 40.0))),
+        ("point", Light::Point(PointLight { position: at, intensity: radiance_of })),
+        ("rect", Light::Rect(Rect::new(at, -at, Vec3::Y, [0.5, 0.3], radiance_of))),
+        ("disk", Light::Disk(Disk::new(at, -at, 0.3, radiance_of))),
+        ("sphere", Light::Sphere(SphereLight { middle: at, radius: 0.2, radiance: radiance_of })),
+        ("sky", Light::Environment(Environment::constant(radiance_of, false))),
+    ];
+    for (name, light) in lights {
+        let cloud = volume([32; 3], [2.0; 3], |_| 0.0);
+        let mut setup = Setup::new(cloud, matter(0.8), 1.5);
+        setup.lights = vec![light];
+        setup.max_scatter = 1;
+        let scene = setup.scene();
+        let ray = Ray::new(Vec3::new(-0.4, -0.2, 3.0), -Vec3::Z);
+        let marched = f64::from(RayMarch::new(&scene, 0.25, 512).march(&scene, &ray).radiance.g);
+        let walked = radiance(&scene, 1_000_000, |_| ray);
+        let error = walked.variance_of_mean().sqrt();
+        assert!(error < 4e-3 * marched, "{name}: noise {error} of {marched}");
+        assert!(
+            (walked.mean() - marched).abs() < 3.5 * error + 2e-3 * marched,
+            "{name}: {} +- {error} by paths, {marched} by marching",
+            walked.mean()
+        );
     }
 }

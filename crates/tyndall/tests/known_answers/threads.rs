@@ -35,7 +35,8 @@ fn picture(scene: &Scene, threads: usize, slice: Option<Duration>) -> Image {
     let mut budget = Budget::samples(5);
     while session.film().samples() < 5 {
         budget.deadline = slice.map(|slice| Instant::now() + slice);
-        session.refine(&budget);
+        let done = session.refine(&budget);
+        assert!(done.mean_samples <= 5.0, "{} samples: a tile went past the others' end", done.mean_samples);
     }
     session.image()
 }

@@ -44,6 +44,14 @@ fn constant_density() {
     assert_agree(&scene, &ray, (-0.5 * 1.5 * 4.0_f64).exp());
 }
 
+/// Even and dense in many cells: the control alone gets past the depth from which it lives on by chance.
+#[test]
+fn constant_density_in_many_cells() {
+    let scene = Setup::new(volume([6, 6, 64], [1.0, 1.0, 4.0], |_| 1.0), ramp(), 1.0).scene();
+    // Eight cells of half an optical depth each.
+    assert_agree(&scene, &Ray::new(Vec3::new(0.2, 0.3, 9.0), -Vec3::Z), (-4.0_f64).exp());
+}
+
 #[test]
 fn linear_density_along_every_axis_and_aslant() {
     let n = 40;
@@ -160,11 +168,14 @@ fn skipping_changes_nothing() {
         let mut point = || Vec3::new(s.uniform() - 0.5, s.uniform() - 0.5, s.uniform() - 0.5);
         let (from, to) = (point().normalize() * 4.0, point());
         let ray = Ray::new(from, (to - from).normalize());
-        let thickness = |scene: &Scene| {
-            let track = scene.medium.track(&ray, f32::INFINITY);
-            scene.medium.optical_thickness(&track, 0.013, f32::INFINITY)
-        };
-        let (skipped, plain) = (thickness(&fine), thickness(&whole));
-        assert!((skipped - plain).abs() <= 1e-6 * plain, "{skipped} {plain} on ray {i}");
+        // The long step is longer than the margin of a voxel that every cell knows of its neighbours.
+        for step in [0.013, 0.11] {
+            let thickness = |scene: &Scene| {
+                let track = scene.medium.track(&ray, f32::INFINITY);
+                scene.medium.optical_thickness(&track, step, f32::INFINITY)
+            };
+            let (skipped, plain) = (thickness(&fine), thickness(&whole));
+            assert!((skipped - plain).abs() <= 1e-6 * plain, "{skipped} {plain} on ray {i}, step {step}");
+        }
     }
 }

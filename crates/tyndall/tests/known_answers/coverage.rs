@@ -1,0 +1,67 @@
+//! What matter covers, how far away it is, and what shows behind it.
+
+use crate::scenes::{Setup, blocks, mean, slab, trace};
+use tyndall::film::PixelSample;
+use tyndall::integrator::{Path, RayMarch};
+use tyndall::math::{Ray, Rgb, Vec3};
+use tyndall::scattering::Phase;
+use tyndall::scene::{Background, Scene};
+use tyndall::transfer::{Optics, Point};
+
+/// A bright wall behind conservative matter that no light falls on.
+fn before_a_wall(thickness: f32) -> Scene {
+    let mut scene = slab(thickness, 1.0, Phase::Isotropic).scene();
+    scene.background = Background::Color(Rgb::splat(3.0));
+    scene
+}
+
+/// A quantity of a sample.
+type Part = fn(&PixelSample) -> f32;
+
+#[test]
+fn alpha_depth_and_background_have_closed_forms() {
+    const PARTS: [(&str, Part); 3] =
+        [("radiance", |s| s.radiance.g), ("alpha", |s| s.alpha), ("depth", |s| s.depth)];
+    // The slab's top is 2 from the start, along the ray; the camera looks down, the ray aslant.
+    let cos = 0.6_f64;
+    let out = Vec3::new(0.8, 0.0, 0.6);
+    let ray = Ray::new(Vec3::Z * 0.5 + out * 2.0, -out);
+    for thickness in [0.4_f32, 1.2] {
+        let scene = before_a_wall(thickness);
+        let sigma = f64::from(thickness);
+        let tau = sigma / cos;
+        let through = (-tau).exp();
+        let inside = (1.0 - through * (1.0 + tau)) / sigma;
+        let expected = [3.0 * through, 1.0 - through, cos * (2.0 * (1.0 - through) + inside)];
+        // The slab's voxel is wide: steps count in its cube root.
+        let march = RayMarch::new(&scene, 1e-3 / 1e5_f32.powf(2.0 / 3.0), 1).march(&scene, &ray);
+        for ((name, pick), expected) in PARTS.into_iter().zip(expected) {
+            let marched = f64::from(pick(&march));
+            assert!(
+                (marched / expected - 1.0).abs() < 1e-3,
+                "{name} by marching {marched}, expected {expected}"
+            );
+            let walked = mean(8, 1_000_000, |numbers, _| f64::from(pick(&trace(&scene, ray, numbers))));
+            walked.against(expected).assert_within(3.5, 3e-3);
+        }
+    }
+}
+
+/// Samples spread over the whole pixel, evenly.
+#[test]
+fn a_pixel_is_covered_as_far_as_matter_fills_it() {
+    // Matter left of x = 1/4, of which a pixel from -1/2 to 1/2 sees three quarters.
+    let nothing = Optics { opacity: 0.0, ..Optics::default() };
+    let points = vec![Point { value: 0.0, optics: nothing }, Point { value: 1.0, optics: Optics::default() }];
+    let half = blocks([64; 3], [2.0; 3], |p| f32::from(u8::from(p[0] < 40)));
+    let scene = Setup::new(half, points, 1e4).scene();
+    let march = RayMarch::new(&scene, 0.5, 1);
+    let covered = |sample: &dyn Fn(u32) -> PixelSample| {
+        (0..4096).map(|i| f64::from(sample(i).alpha)).sum::<f64>() / 4096.0
+    };
+    let walked = covered(&|i| Path.sample(&scene, [0, 0], i));
+    let marched = covered(&|i| march.sample(&scene, [0, 0], i));
+    for share in [walked, marched] {
+        assert!((share - 0.75).abs() < 2e-3, "{share} of the pixel");
+    }
+}
