@@ -98,6 +98,14 @@ pub enum ReadError {
         /// What is wrong with the other.
         source: Box<ReadError>,
     },
+    /// The data values are too large to be rendered.
+    #[error("{}: values from {:e} to {:e}, expected at most {:e} in size; rescale them", .path.display(), .range[0], .range[1], f32::MAX)]
+    Values {
+        /// The file.
+        path: PathBuf,
+        /// The smallest and the largest data value.
+        range: [f64; 2],
+    },
     /// The header's geometry cannot be.
     #[error("{}: {source}", .path.display())]
     Grid {

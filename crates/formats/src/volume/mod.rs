@@ -108,6 +108,12 @@ impl Parsed {
         }
         let volume = Volume::new(grid, voxels, values)
             .map_err(|source| ReadError::Volume { path: path.into(), source })?;
+        let range = volume.value_range();
+        // Not so for NaN, which slope and intercept can make of two infinities.
+        let fits = |value: &f64| value.abs() <= f64::from(f32::MAX);
+        if !range.iter().all(fits) {
+            return Err(ReadError::Values { path: path.into(), range });
+        }
         Ok(Loaded { volume, channels, times, notes })
     }
 }
@@ -132,6 +138,19 @@ mod tests {
         for name in ["a.nii.gz", "a.mha", "a", "a.npy", "a.raw"] {
             let (_folder, path) = folder_with(name, nrrd);
             assert_eq!(read(&path).unwrap().volume.voxels(), &Voxels::U8(vec![1, 2]), "{name}");
+        }
+    }
+
+    #[test]
+    fn values_that_single_precision_cannot_hold_are_refused() {
+        for (largest, fits) in [(3.4e38, true), (3.5e38, false), (-1e300, false)] {
+            let head = b"NRRD0004\ntype: double\ndimension: 1\nsizes: 2\nencoding: raw\nendian: little\n\n";
+            let bytes = [&head[..], &[0; 8], &f64::to_le_bytes(largest)].concat();
+            let (_folder, path) = folder_with("a.nrrd", &bytes);
+            match read(&path) {
+                Ok(_) => assert!(fits, "{largest}"),
+                Err(error) => assert!(!fits && matches!(error, ReadError::Values { .. }), "{error}"),
+            }
         }
     }
 
