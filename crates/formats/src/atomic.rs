@@ -33,8 +33,9 @@ pub fn check(path: &Path) -> Result<()> {
 
 /// Where the bytes go: through links, and never over a folder, a device or a protected file.
 fn destination(path: &Path) -> Result<PathBuf> {
-    let Ok(existing) = path.canonicalize() else {
-        return Ok(path.to_owned());
+    let existing = match path.canonicalize() {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(path.to_owned()),
+        found => found?,
     };
     let about = existing.metadata()?;
     if about.is_dir() {
