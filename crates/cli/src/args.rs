@@ -1,7 +1,17 @@
 //! The command line.
 
-use clap::{Args as Group, Parser, Subcommand, ValueEnum};
+use clap::builder::PossibleValuesParser;
+use clap::{Args as Group, Parser, Subcommand, ValueEnum, value_parser};
 use std::path::PathBuf;
+use std::time::Duration;
+use tyndall::transfer::PRESETS;
+
+/// The scene document's own limits, so that a number past them is told as the option's fault.
+const MOST_SAMPLES: i64 = 1 << 31;
+const MOST_SCATTER: i64 = 1_000_000;
+
+/// Past so many threads starting them takes longer than most pictures.
+const MOST_THREADS: i64 = 1024;
 
 /// Shows volumes (CT, MRI, microscopy, simulations) as light would really cross them.
 #[derive(Debug, Parser)]
@@ -62,12 +72,12 @@ pub struct RenderOptions {
 
     /// Stop after N samples per pixel [default: the scene's, if no other stop is given]
     #[arg(long, value_name = "N", help_heading = "When to stop (the first met wins)",
-          value_parser = clap::value_parser!(u32).range(1..))]
+          value_parser = value_parser!(u32).range(1..=MOST_SAMPLES))]
     pub samples: Option<u32>,
 
     /// Stop after SECONDS of rendering, not counting loading
-    #[arg(long, value_name = "SECONDS", help_heading = "When to stop (the first met wins)", value_parser = positive)]
-    pub time: Option<f64>,
+    #[arg(long, value_name = "SECONDS", help_heading = "When to stop (the first met wins)", value_parser = seconds)]
+    pub time: Option<Duration>,
 
     /// Stop when the picture's relative error (noise) is at most E, e.g. 0.02
     #[arg(long, value_name = "E", help_heading = "When to stop (the first met wins)", value_parser = positive)]
@@ -82,11 +92,13 @@ pub struct RenderOptions {
     pub seed: Option<u64>,
 
     /// Keep light that scattered at most K times
-    #[arg(long, value_name = "K", help_heading = "Scene")]
+    #[arg(long, value_name = "K", help_heading = "Scene",
+          value_parser = value_parser!(u32).range(..=MOST_SCATTER))]
     pub max_scatter: Option<u32>,
 
     /// Use this transfer function; `tyndall presets` lists them
-    #[arg(long, value_name = "NAME", help_heading = "Scene")]
+    #[arg(long, value_name = "NAME", help_heading = "Scene", hide_possible_values = true,
+          value_parser = PossibleValuesParser::new(PRESETS.map(|preset| preset.name)))]
     pub preset: Option<String>,
 
     /// Override any key of the scene, e.g. medium.density=0.3 or lights.0.radiance=[1,2,3]; repeats
@@ -96,7 +108,7 @@ pub struct RenderOptions {
     pub set: Vec<String>,
 
     /// Threads [default: one per processor]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=MOST_THREADS))]
     pub threads: Option<u16>,
 
     /// Write statistics as JSON to FILE (`-` for standard output)
@@ -160,10 +172,16 @@ fn positive(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number above 0".into())
 }
 
+/// More seconds than the clock can count are for ever.
+fn seconds(text: &str) -> Result<Duration, String> {
+    positive(text).map(|x| Duration::try_from_secs_f64(x).unwrap_or(Duration::MAX))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use clap::CommandFactory;
+    use tyndall::scene::document;
 
     #[test]
     fn the_command_line_is_consistent() {
@@ -173,5 +191,19 @@ mod tests {
             assert!(size(bad).is_err(), "{bad}");
         }
         assert!(positive("nan").is_err() && positive("0").is_err() && positive("0.5") == Ok(0.5));
+    }
+    #[test]
+    fn seconds_are_never_too_many() {
+        assert_eq!(seconds("1.5"), Ok(Duration::from_millis(1500)));
+        assert_eq!(seconds("1e300"), Ok(Duration::MAX));
+        assert!(seconds("inf").is_err() && seconds("-1").is_err());
+    }
+
+    #[test]
+    fn options_have_the_limits_of_the_document() {
+        let schema = document::schema();
+        for (key, most) in [("samples", MOST_SAMPLES), ("max_scatter", MOST_SCATTER)] {
+            assert_eq!(schema["$defs"]["Render"]["properties"][key]["maximum"], most, "{key}");
+        }
     }
 }

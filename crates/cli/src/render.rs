@@ -64,7 +64,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let limited = options.time.is_some() || options.target_error.is_some();
     let stop = Stop {
         samples: if limited && options.samples.is_none() { u32::MAX } else { document.render.samples },
-        time: options.time.map(Duration::from_secs_f64),
+        time: options.time,
         error: options.target_error,
     };
     let interrupted = on_interrupt();
@@ -98,7 +98,8 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
 /// Refines slice by slice until a stop is met, showing how far it is.
 fn refine(session: &mut Session, stop: &Stop, cancel: &Arc<AtomicBool>, mut display: Display) {
     let begun = Instant::now();
-    let end = stop.time.map(|time| begun + time);
+    // A time that the clock cannot count to never comes.
+    let end = stop.time.and_then(|time| begun.checked_add(time));
     let mut looked = begun;
     let mut error = None;
     loop {
