@@ -90,13 +90,30 @@ fn metadata(film: &Film, document: &Document, from: &Path, to: &Path) -> Metadat
     metadata
 }
 
-/// A path that starts from one folder, written to start from another; absolute if no way leads there.
+/// A path that starts from one folder, written to start from another; an absolute one stays, and one to which no way
+/// leads becomes so.
 fn relocate(path: &str, from: &Path, to: &Path) -> String {
-    let absolute = |p: &Path| std::path::absolute(p).unwrap_or_else(|_| p.to_owned());
-    let here = if to.as_os_str().is_empty() { PathBuf::from(".") } else { to.to_owned() };
-    let target = absolute(&from.join(path));
-    let way = pathdiff::diff_paths(&target, absolute(&here)).unwrap_or(target);
+    if Path::new(path).is_absolute() {
+        return path.to_owned();
+    }
+    let target = from.join(path);
+    // The file itself may be a link, whose own name is the one to keep.
+    let target = match (target.parent(), target.file_name()) {
+        (Some(folder), Some(name)) => real(folder).join(name),
+        _ => real(&target),
+    };
+    let way = pathdiff::diff_paths(&target, real(to)).unwrap_or(target);
     way.to_string_lossy().replace('\\', "/")
+}
+
+/// The absolute path of a folder. Without links, where it is there: `..` behind a link leads elsewhere than it seems.
+fn real(folder: &Path) -> PathBuf {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    folder.canonicalize().unwrap_or_else(|_| absolute(folder))
+}
+
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
 /// Writes statistics as JSON.
@@ -123,10 +140,22 @@ mod tests {
 
     #[test]
     fn paths_follow_the_picture() {
-        let moved = |path, from: &str, to: &str| relocate(path, Path::new(from), Path::new(to));
+        let root = tempfile::tempdir().unwrap();
+        for folder in ["data/a", "data/x", "out/deep"] {
+            std::fs::create_dir_all(root.path().join(folder)).unwrap();
+        }
+        let moved =
+            |path: &str, from: &str, to: &str| relocate(path, &root.path().join(from), &root.path().join(to));
         assert_eq!(moved("head.nrrd", "data", "out"), "../data/head.nrrd");
-        assert_eq!(moved("head.nrrd", "data", ""), "data/head.nrrd");
-        assert_eq!(moved("head.nrrd", "", ""), "head.nrrd");
+        assert_eq!(moved("head.nrrd", "data", "data"), "head.nrrd");
         assert_eq!(moved("../x/head.nrrd", "data/a", "data"), "x/head.nrrd");
+        assert_eq!(relocate("head.nrrd", Path::new(""), Path::new("")), "head.nrrd");
+        let absolute = root.path().join("head.nrrd").to_string_lossy().into_owned();
+        assert_eq!(moved(&absolute, "data", "out"), absolute);
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(root.path().join("out/deep"), root.path().join("data/link")).unwrap();
+            assert_eq!(moved("head.nrrd", "data", "data/link"), "../../data/head.nrrd");
+        }
     }
 }
