@@ -13,7 +13,7 @@ mod stats;
 use args::{Args, Command};
 use clap::{CommandFactory, Parser};
 use failure::Failure;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -46,7 +46,14 @@ fn main() -> ExitCode {
 /// Writes to stdout; a closed pipe is a failure with a message, not a panic.
 fn say(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes())
-        .and_then(|()| out.flush())
-        .map_err(|e| Failure::input(format!("standard output: {e}; what reads it must stay open")))
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|e| stdout_failure(&e))
+}
+
+/// Why stdout took no more.
+fn stdout_failure(error: &std::io::Error) -> Failure {
+    let mend = match error.kind() {
+        ErrorKind::BrokenPipe => "what reads it must stay open to the end",
+        _ => "send it elsewhere",
+    };
+    Failure::input(format!("standard output: {error}; {mend}"))
 }

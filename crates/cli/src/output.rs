@@ -1,6 +1,7 @@
 //! Pictures and statistics to where they were asked for.
 
-use crate::{Failure, say};
+use crate::{Failure, say, stdout_failure};
+use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use tyndall::film::tone::ToneCurve;
@@ -23,12 +24,25 @@ pub fn places(asked: &[PathBuf], input: &Path) -> Vec<PathBuf> {
     vec![PathBuf::from(format!("{stem}.png"))]
 }
 
-/// Refuses, before any work, places where no picture can be written.
-pub fn check(places: &[PathBuf]) -> Result<(), Failure> {
-    for place in places.iter().filter(|p| p.as_os_str() != STDOUT) {
-        tyndall_formats::image::check_destination(place).map_err(Failure::input)?;
+/// Refuses, before any work, places where nothing can be written and places that are named twice.
+pub fn check(pictures: &[PathBuf], statistics: Option<&Path>) -> Result<(), Failure> {
+    let mut taken = BTreeSet::new();
+    for place in pictures.iter().map(PathBuf::as_path).chain(statistics) {
+        if !taken.insert(absolute(place)) {
+            let place = place.display();
+            return Err(Failure::usage(format!(
+                "`{place}` is to be written twice; expected a place of its own for each output"
+            )));
+        }
     }
-    Ok(())
+    for place in pictures.iter().filter(|p| p.as_os_str() != STDOUT) {
+        tyndall_formats::image::check_destination(place).map_err(Failure::usage)?;
+    }
+    match statistics.filter(|p| p.as_os_str() != STDOUT) {
+        Some(place) => tyndall_formats::atomic::check(place)
+            .map_err(|e| Failure::usage(format!("--stats {}", unwritable(place, &e)))),
+        None => Ok(()),
+    }
 }
 
 /// Writes the film to every place.
@@ -61,9 +75,7 @@ pub fn pictures(
         if to_stdout {
             let bytes = encode_png(&picture, &display, &metadata).map_err(Failure::input)?;
             let mut out = std::io::stdout().lock();
-            out.write_all(&bytes).and_then(|()| out.flush()).map_err(|e| {
-                Failure::input(format!("standard output: {e}; what reads the picture must stay open"))
-            })?;
+            out.write_all(&bytes).and_then(|()| out.flush()).map_err(|e| stdout_failure(&e))?;
         } else {
             write(place, &picture, &display, &metadata).map_err(Failure::input)?;
         }
@@ -123,7 +135,14 @@ pub fn statistics(place: &Path, value: &serde_json::Value) -> Result<(), Failure
         return say(&text);
     }
     tyndall_formats::atomic::replace(place, text.as_bytes())
-        .map_err(|e| Failure::input(format!("{}: statistics cannot be written: {e}", place.display())))
+        .map_err(|e| Failure::input(unwritable(place, &e)))
+}
+
+fn unwritable(place: &Path, error: &std::io::Error) -> String {
+    let place = place.display();
+    format!(
+        "{place}: statistics cannot be written: {error}; name a file in a folder that takes files, or `-`"
+    )
 }
 
 #[cfg(test)]

@@ -38,10 +38,10 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     };
     let mut stages = Stages::new(started);
     let threads = pool(options.threads)?;
-    let places = output::places(&options.outputs, &options.input);
-    output::check(&places)?;
-
     let mut input = Input::open(&options.input)?;
+    let places = output::places(&options.outputs, &options.input);
+    output::check(&places, options.stats.as_deref())?;
+
     input.override_with(options)?;
     let (document, assets, source) = threads.install(|| input.load(&options.input))?;
     let load_s = stages.end("load");
