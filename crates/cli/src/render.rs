@@ -26,6 +26,8 @@ struct Stop {
     samples: u32,
     time: Option<Duration>,
     error: Option<f64>,
+    /// Samples that will do for a picture whose error cannot be told: of a method without noise, or all black.
+    usual_samples: u32,
 }
 
 /// Renders INPUT to pictures and statistics.
@@ -66,6 +68,8 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         samples: if limited && options.samples.is_none() { u32::MAX } else { document.render.samples },
         time: options.time,
         error: options.target_error,
+        // An error takes two samples to be told.
+        usual_samples: document.render.samples.max(2),
     };
     let interrupted = on_interrupt();
     let display = Display::new(options.progress, options.quiet);
@@ -107,18 +111,25 @@ fn refine(session: &mut Session, stop: &Stop, cancel: &Arc<AtomicBool>, mut disp
         // The first sample of every pixel is always taken: no picture has holes.
         let complete = session.film().samples() > 0;
         let deadline = if complete { end.map_or(slice, |end| end.min(slice)) } else { slice };
-        let budget = Budget { samples: stop.samples, deadline: Some(deadline), cancel: cancel.clone() };
+        // Whether the picture has an error at all shows by then.
+        let untold = stop.error.is_some() && error.is_none();
+        let samples = if untold { stop.samples.min(stop.usual_samples) } else { stop.samples };
+        let budget = Budget { samples, deadline: Some(deadline), cancel: cancel.clone() };
         session.refine(&budget);
 
         let film = session.film();
         let seconds = begun.elapsed().as_secs_f64();
         let samples_done = film.samples() >= stop.samples;
-        if looked.elapsed() >= ERROR_EVERY || samples_done || begun.elapsed() < ERROR_EVERY {
+        let all_taken = film.samples() >= samples;
+        if looked.elapsed() >= ERROR_EVERY || all_taken || begun.elapsed() < ERROR_EVERY {
             looked = Instant::now();
             error = session.relative_error();
         }
         let time_is_up = film.samples() > 0 && end.is_some_and(|end| Instant::now() >= end);
-        let good_enough = stop.error.zip(error).is_some_and(|(target, error)| error <= target);
+        let good_enough = stop.error.is_some_and(|target| match error {
+            Some(error) => error <= target,
+            None => film.samples() >= stop.usual_samples,
+        });
         if samples_done || time_is_up || good_enough || cancel.load(Ordering::Relaxed) {
             break;
         }
