@@ -39,6 +39,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         }
     };
     let mut stages = Stages::new(started);
+    let interrupt = Interrupt::listen();
     let threads = pool(options.threads)?;
     let mut input = Input::open(&options.input)?;
     let places = output::places(&options.outputs, &options.input);
@@ -71,10 +72,14 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         // An error takes two samples to be told.
         usual_samples: document.render.samples.max(2),
     };
-    let interrupted = on_interrupt();
+    interrupt.ask_from_now_on();
     let display = Display::new(options.progress, options.quiet);
-    refine(&mut session, &stop, &interrupted, display);
+    refine(&mut session, &stop, &interrupt.asked, display);
     let rendered = stages.end("render");
+    let interrupted = interrupt.asked.load(Ordering::Relaxed);
+    if interrupted && session.film().mean_samples() == 0.0 {
+        return Err(Failure::Interrupted);
+    }
     note(&format!("{:.2} samples per pixel in {rendered:.2} s", session.film().mean_samples()));
 
     output::pictures(&places, session.film(), &document, &input.folder)?;
@@ -96,7 +101,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         });
         output::statistics(place, &statistics)?;
     }
-    if interrupted.load(Ordering::Relaxed) { Err(Failure::Interrupted) } else { Ok(()) }
+    if interrupted { Err(Failure::Interrupted) } else { Ok(()) }
 }
 
 /// Refines slice by slice until a stop is met, showing how far it is.
@@ -154,17 +159,30 @@ fn pool(threads: Option<u16>) -> Result<Arc<rayon::ThreadPool>, Failure> {
         .map_err(|e| Failure::usage(format!("--threads: {e}")))
 }
 
-/// A flag that Ctrl-C raises; a second Ctrl-C ends at once.
-fn on_interrupt() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let raised = flag.clone();
-    // Without a handler Ctrl-C still ends the program, only without a picture.
-    drop(ctrlc::set_handler(move || {
-        if raised.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    }));
-    flag
+/// Ctrl-C: ends the program at once while there is no picture to save, then asks for an early end, and
+/// the second time ends at once again.
+#[derive(Clone, Debug, Default)]
+struct Interrupt {
+    asks: Arc<AtomicBool>,
+    asked: Arc<AtomicBool>,
+}
+
+impl Interrupt {
+    fn listen() -> Self {
+        let interrupt = Self::default();
+        let heard = interrupt.clone();
+        // Without a handler Ctrl-C still ends the program, only without a picture.
+        drop(ctrlc::set_handler(move || {
+            if !heard.asks.load(Ordering::Relaxed) || heard.asked.swap(true, Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        }));
+        interrupt
+    }
+
+    fn ask_from_now_on(&self) {
+        self.asks.store(true, Ordering::Relaxed);
+    }
 }
 
 fn refuse_film_that_does_not_fit(size: [u32; 2]) -> Result<(), Failure> {
