@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tyndall::scene::Assets;
 use tyndall::scene::document::{self, Document};
-use tyndall_formats::assets;
+use tyndall_formats::assets::{self, AssetError};
 use tyndall_formats::image::{Metadata, read_metadata};
 
 /// A document as it was found, before any override.
@@ -85,14 +85,21 @@ impl Input {
         if let Some(preset) = &options.preset {
             patch["transfer_function"]["preset"] = preset.as_str().into();
         }
-        self.value = document::apply(&self.value, &patch);
+        // Anything but a table would become one, and the check would not find what really stands in the file.
+        if self.value.is_object() {
+            self.value = document::apply(&self.value, &patch);
+        }
         Ok(())
     }
 
     /// Checks the document and reads what it names.
     pub fn load(&self, path: &Path) -> Result<(Document, Assets, assets::Source), Failure> {
         let mut document = in_file(path, Document::from_value(self.value.clone()))?;
-        let (assets, source) = assets::load(&document, &self.folder).map_err(Failure::input)?;
+        let (assets, source) = assets::load(&document, &self.folder).map_err(|e| match e {
+            AssetError::Volume(_) => Failure::input(e),
+            // Of the others each begins with a key.
+            _ => Failure::input(format!("{}: {e}", path.display())),
+        })?;
         if self.bare && self.value.pointer("/medium/density").is_none() {
             document.medium.density = BARE_THICKNESS / assets.volume.grid().diagonal();
         }
@@ -107,14 +114,15 @@ fn in_file<T>(path: &Path, result: Result<T, document::DocumentError>) -> Result
 
 fn read_text(path: &Path) -> Result<String, Failure> {
     let fail = |problem: &dyn std::fmt::Display| Failure::input(format!("{}: {problem}", path.display()));
-    let about = std::fs::metadata(path).map_err(|e| fail(&e))?;
+    let unreadable = |e| fail(&format!("cannot be read: {e}; check the path"));
+    let about = std::fs::metadata(path).map_err(unreadable)?;
     if !about.is_file() {
         return Err(fail(&"not a file; expected a scene document"));
     }
     if about.len() > LARGEST_DOCUMENT {
         return Err(fail(&format!("{} bytes; a scene document has at most {LARGEST_DOCUMENT}", about.len())));
     }
-    let bytes = std::fs::read(path).map_err(|e| fail(&e))?;
+    let bytes = std::fs::read(path).map_err(unreadable)?;
     String::from_utf8(bytes).map_err(|e| {
         fail(&format!("byte {} is no UTF-8; save the scene as UTF-8", e.utf8_error().valid_up_to()))
     })

@@ -8,6 +8,7 @@ use crate::progress::Display;
 use crate::stats::{Stages, peak_memory};
 use serde_json::json;
 use std::io::Write;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -48,7 +49,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     input.override_with(options)?;
     let (document, assets, source) = threads.install(|| input.load(&options.input))?;
     let load_s = stages.end("load");
-    refuse_film_that_does_not_fit(document.film.size)?;
+    refuse_film_that_does_not_fit(document.film.size, &options.input)?;
     let scene = threads
         .install(|| Scene::build(&document, &assets))
         .map_err(|e| Failure::input(format!("{}: {e}", options.input.display())))?;
@@ -185,12 +186,13 @@ impl Interrupt {
     }
 }
 
-fn refuse_film_that_does_not_fit(size: [u32; 2]) -> Result<(), Failure> {
+fn refuse_film_that_does_not_fit(size: [u32; 2], input: &Path) -> Result<(), Failure> {
     // The film, the picture with its layers, and the encoder's copy of it.
     let needed = 3 * Film::bytes(size);
     match tyndall_formats::memory::available() {
         Some(available) if needed > available => Err(Failure::input(format!(
-            "`film.size`: {} x {} pixels need {} MiB, but {} MiB are free; expected a smaller picture",
+            "{}: film.size: {} x {} pixels need {} MiB, but {} MiB are free; expected a smaller picture",
+            input.display(),
             size[0],
             size[1],
             needed >> 20,
