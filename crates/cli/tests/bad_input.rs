@@ -1,0 +1,344 @@
+//! Bad input ends with the right exit status and one message that names the fault: 1 where the input is at fault, 2
+//! where the command line is. Nothing panics, nothing hangs, nothing is left behind.
+
+mod support;
+
+use support::{Ended, Folder};
+
+/// Keys of a scene that is sound as far as it goes; what is wrong is added below.
+const SCENE: &str = "volume.procedural = { kind = 'sphere', size = [4, 4, 4] }\nrender.samples = 1\n";
+
+/// A run that is to fail.
+struct Fault {
+    files: Vec<(&'static str, Vec<u8>)>,
+    arguments: Vec<&'static str>,
+    status: i32,
+    /// Words of the message.
+    says: Vec<&'static str>,
+}
+
+impl Fault {
+    /// What must be; the folder `out`, in which the program runs, must stay empty.
+    fn check(&self) {
+        let folder = Folder::new();
+        for (name, bytes) in &self.files {
+            folder.put(name, bytes);
+        }
+        let Ended { status, stdout, stderr } = folder.run(&self.arguments);
+        let told = format!("{:?}: status {status:?}\n{stderr}", self.arguments);
+        assert_eq!(status, Some(self.status), "{told}");
+        assert!(!stderr.contains("panicked"), "{told}");
+        for word in &self.says {
+            assert!(stderr.contains(word), "`{word}` is not in {told}");
+        }
+        let messages = stderr.lines().filter(|l| l.starts_with("tyndall: ") || l.starts_with("error: "));
+        assert_eq!(messages.count(), 1, "{told}");
+        assert!(stderr.len() < 1000, "{told}");
+        assert!(stdout.is_empty(), "{told}");
+        let left: Vec<_> = std::fs::read_dir(folder.at("out")).expect("a folder").collect();
+        assert!(left.is_empty(), "{left:?} left by {told}");
+    }
+}
+
+/// The content of a file at fault: exit status 1.
+fn file(name: &'static str, bytes: impl Into<Vec<u8>>, says: &[&'static str]) {
+    let arguments = vec!["render", name];
+    Fault { files: vec![(&name["../".len()..], bytes.into())], arguments, status: 1, says: says.to_vec() }
+        .check();
+}
+
+/// A scene in TOML at fault, with a file of eight bytes beside it.
+fn toml(text: String, says: &[&'static str]) {
+    let files = vec![("scene.toml", text.into_bytes()), ("eight.raw", vec![0; 8])];
+    Fault { files, arguments: vec!["render", "../scene.toml"], status: 1, says: says.to_vec() }.check();
+}
+
+/// Options at fault beside a sound scene.
+fn options(options: &[&'static str], status: i32, says: &[&'static str]) {
+    let files = vec![("scene.toml", SCENE.into())];
+    let arguments = [&["render", "../scene.toml"], options].concat();
+    Fault { files, arguments, status, says: says.to_vec() }.check();
+}
+
+#[test]
+fn a_key_at_fault_is_named_with_its_file() {
+    for (key, line) in [
+        ("medium.densty", "medium.densty = 1"),
+        ("camra", "camra = {}"),
+        ("objects", "objects = [{ path = 'a.ply' }]"),
+        ("surfaces", "surfaces = [{ type = 'plane' }]"),
+        ("version", "version = 2"),
+        ("version", "version = '1'"),
+        ("medium", "medium = 3"),
+        ("medium.density", "medium.density = -1"),
+        ("medium.density", "medium.density = inf"),
+        ("medium.density", "medium.density = nan"),
+        ("medium.phase.type", "medium.phase.type = 'mie'"),
+        ("medium.phase.g", "medium.phase = { type = 'henyey-greenstein', g = 1 }"),
+        ("medium.phase.k", "medium.phase = { type = 'schlick', k = -1.0 }"),
+        ("medium.brdf", "medium.brdf = { type = 'abc', b = 0 }"),
+        ("transfer_function.points", "transfer_function.points = []"),
+        (
+            "transfer_function.points.1.value",
+            "transfer_function.points = [{ value = 1, opacity = 0 }, { value = 0, opacity = 1 }]",
+        ),
+        ("transfer_function.points.0.value", "transfer_function.points = [{ value = 1e300, opacity = 0 }]"),
+        ("transfer_function.points.0.opacity", "transfer_function.points = [{ value = 0, opacity = 1.5 }]"),
+        ("transfer_function.points.0.opacity", "transfer_function.points = [{ value = 0 }]"),
+        (
+            "transfer_function.points.0.albedo.2",
+            "transfer_function.points = [{ value = 0, opacity = 1, albedo = [0, 1, 2] }]",
+        ),
+        (
+            "transfer_function.points.0.ior",
+            "transfer_function.points = [{ value = 0, opacity = 1, ior = 0 }]",
+        ),
+        (
+            "transfer_function",
+            "transfer_function = { preset = 'mri', points = [{ value = 0, opacity = 1 }] }",
+        ),
+        ("transfer_function.preset", "transfer_function.preset = 'no-such'"),
+        ("lights", "lights = 3"),
+        ("lights.0.type", "lights = [{ radiance = 1 }]"),
+        ("lights.0.type", "lights = [{ type = 'spot' }]"),
+        ("lights.0.position.1", "lights = [{ type = 'point', position = [0, -inf, 0], intensity = 1 }]"),
+        ("lights.0.intensity", "lights = [{ type = 'point', position = [0, 0, 0] }]"),
+        ("lights.0.direction", "lights = [{ type = 'directional', direction = [0, 0, 0], irradiance = 1 }]"),
+        (
+            "lights.0.target",
+            "lights = [{ type = 'disk', position = [1, 1, 1], target = [1, 1, 1], radius = 1, radiance = 1 }]",
+        ),
+        (
+            "lights.0.size.0",
+            "lights = [{ type = 'rect', position = [0, 0, 9], target = [0, 0, 0], size = [0, 1], radiance = 1 }]",
+        ),
+        ("lights.0", "lights = [{ type = 'environment' }]"),
+        ("lights.0", "lights = [{ type = 'environment', radiance = 1, map = 'a.exr' }]"),
+        ("lights.0.map", "lights = [{ type = 'environment', map = 'no-such.exr' }]"),
+        ("lights.0.map", "lights = [{ type = 'environment', map = 'eight.raw' }]"),
+        ("clip.0.normal", "clip = [{ type = 'plane', point = [0, 0, 0], normal = [0, 0, 0] }]"),
+        ("clip.0.min", "clip = [{ type = 'box', min = [0, 0, 0], max = [1, 0, 1] }]"),
+        ("camera", "camera = { auto = {}, position = [0, 0, 9] }"),
+        ("camera.target", "camera = { position = [1, 1, 1], target = [1, 1, 1] }"),
+        ("camera.position", "camera.position = [0, 0, 0]"),
+        ("camera.up", "camera = { position = [0, 0, 9], target = [0, 0, 0], up = [0, 0, 1] }"),
+        ("camera.up", "camera = { position = [0, 0, 9], up = [0, 0, 1] }"),
+        ("camera.fov", "camera.fov = 180"),
+        ("camera.fov", "camera = { type = 'orthographic', fov = 30 }"),
+        ("film.size.0", "film.size = [0, 4]"),
+        ("film.size", "film.size = [1000000, 1000000]"),
+        ("film.background", "film.background = 'black'"),
+        ("render.integrator", "render.integrator = 'photon'"),
+        ("render.integrator", "render.integrator = 'bidirectional'"),
+        ("render.photon", "render.photon.photons = 1000"),
+        ("render.max_scatter", "render.max_scatter = 1000001"),
+        ("render.seed", "render.seed = -1"),
+    ] {
+        toml(format!("{SCENE}{line}\n"), &["scene.toml", key]);
+    }
+}
+
+#[test]
+fn a_volume_that_cannot_be_had_is_named() {
+    for (says, volume) in [
+        (["scene.toml", "volume"], ""),
+        (["scene.toml", "neither `path` nor `procedural`"], "volume = {}"),
+        (["scene.toml", "both `path` and `procedural`"], "volume = { path = 'eight.raw', procedural = {} }"),
+        (["scene.toml", "volume.path"], "volume.path = ''"),
+        (
+            ["scene.toml", "volume.raw"],
+            "volume = { procedural = {}, raw = { dims = [1, 1, 1], dtype = 'u8' } }",
+        ),
+        (
+            ["scene.toml", "volume.raw.dtype"],
+            "volume = { path = 'eight.raw', raw = { dims = [2, 2, 2], dtype = 'u7' } }",
+        ),
+        (["scene.toml", "volume.procedural.size"], "volume.procedural.size = [100000, 100000, 100000]"),
+        (["scene.toml", "volume.procedural.size"], "volume.procedural.size = [4294967295, 1, 1]"),
+        (["no-such.nrrd", "No such file"], "volume.path = 'no-such.nrrd'"),
+        (["a folder", "expected a regular file"], "volume.path = '.'"),
+        (["eight.raw", "state their layout"], "volume.path = 'eight.raw'"),
+        (
+            ["eight.raw", "8 bytes"],
+            "volume = { path = 'eight.raw', raw = { dims = [3, 3, 3], dtype = 'u8' } }",
+        ),
+        (
+            ["eight.raw", "spacing"],
+            "volume = { path = 'eight.raw', raw = { dims = [2, 2, 2], dtype = 'u8', spacing = [1e99, 1, 1] } }",
+        ),
+    ] {
+        toml(volume.to_owned(), &says);
+    }
+}
+
+#[test]
+fn a_file_that_is_no_scene_is_named_with_the_place() {
+    file("../a.toml", "medium = {\n", &["a.toml", "line"]);
+    file("../a.toml", "medium.density = 1\nmedium.density = 2\n", &["a.toml", "line 2"]);
+    file("../a.toml", (0..=255).collect::<Vec<u8>>(), &["a.toml", "byte 128", "UTF-8"]);
+    file("../a.toml", format!("x = {}{}", "[".repeat(99_999), "]".repeat(99_999)), &["a.toml", "line 1"]);
+    file("../a.json", "", &["a.json", "line 1"]);
+    file("../a.json", "{\"volume\": ", &["a.json", "line 1"]);
+    file("../a.json", "[".repeat(99_999), &["a.json", "line 1"]);
+    file("../a.json", "[]", &["a.json", "found a list"]);
+    file("../a.json", "null", &["a.json", "found null"]);
+    file("../a.json", "{}", &["a.json", "volume"]);
+    file("../a.json", "{\"volume\": {\"procedural\": {}}, \"camera\": null}", &["a.json", "camera"]);
+    for name in ["no-such.toml", "no-such.json", "no-such.png", "no-such.nrrd"] {
+        let arguments = vec!["render", name];
+        Fault { files: Vec::new(), arguments, status: 1, says: vec![name, "No such file"] }.check();
+    }
+    for folder in ["../scene.toml", "..", "."] {
+        let files = vec![("scene.toml/file", Vec::new())];
+        Fault { files, arguments: vec!["render", folder], status: 1, says: vec!["file", folder] }.check();
+    }
+}
+
+/// An NRRD file of a few bytes.
+fn nrrd(fields: &str, samples: &[u8]) -> Vec<u8> {
+    [format!("NRRD0004\n{fields}\nendian: little\n\n").as_bytes(), samples].concat()
+}
+
+#[test]
+fn a_broken_volume_is_named() {
+    let samples = [7; 8];
+    for (fields, says) in [
+        ("type: uchar\ndimension: 3\nsizes: 9 9 9\nencoding: raw", "8 bytes of samples, expected 729"),
+        ("type: uchar\ndimension: 3\nsizes: 1000000 1000000 1000000\nencoding: raw", "8 bytes of samples"),
+        ("type: uchar\ndimension: 3\nsizes: 0 1 2\nencoding: raw", "sizes"),
+        ("type: block\ndimension: 3\nsizes: 2 2 2\nencoding: raw", "type"),
+        ("type: uchar\ndimension: 3\nsizes: 2 2 2\nencoding: gzip", "cut short"),
+        ("type: uchar\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nspacings: 0 1 1", "spacing"),
+        ("type: uchar\ndimension: 3\nsizes: 2 2 2\nencoding: raw\ndata file: b.raw", "b.raw"),
+    ] {
+        file("../a.nrrd", nrrd(fields, &samples), &["a.nrrd", says]);
+    }
+    let vast = nrrd("type: double\ndimension: 1\nsizes: 1\nencoding: raw", &1e99_f64.to_le_bytes());
+    file("../a.nrrd", vast, &["a.nrrd", "rescale"]);
+    file("../a.nrrd", "", &["a.nrrd", "empty"]);
+    file("../a.nrrd", "NRRD0004\n", &["a.nrrd", "end of the header"]);
+    file("../a.npy", b"\x93NUMPY\x01", &["a.npy", "header"]);
+    file("../a.nii.gz", b"\x1f\x8b\x08 and so on", &["a.nii.gz", "sizeof_hdr"]);
+    file("../a.mha", "NDims = 3\nDimSize = 2 2\n", &["a.mha", "DimSize"]);
+    file("../a.txt", "hello", &["a.txt", "NRRD", "NIfTI", "MetaImage", "NumPy"]);
+}
+
+#[test]
+fn a_picture_without_a_scene_is_named() {
+    file("../a.png", "", &["a.png", "no picture"]);
+    file("../a.png", "hello", &["a.png", "no picture"]);
+    file("../a.png", b"\x89PNG\r\n\x1a\n\0\0", &["a.png", "PNG"]);
+    file("../a.jpg", b"\xff\xd8\xff\xd9\0\0\0\0", &["a.jpg", "scene"]);
+    file("../a.tif", b"II\x2a\0\xff\xff\xff\xff", &["a.tif", "TIFF"]);
+    file("../a.exr", b"\x76\x2f\x31\x01\x02\0\0\0", &["a.exr", "OpenEXR"]);
+}
+
+#[test]
+fn an_option_at_fault_is_named() {
+    for (option, value) in [
+        ("--size", "0x0"),
+        ("--size", "640"),
+        ("--size", "64x64x64"),
+        ("--size", "4294967296x1"),
+        ("--samples", "0"),
+        ("--samples", "1.5"),
+        ("--samples", "4294967295"),
+        ("--time", "0"),
+        ("--time", "inf"),
+        ("--target-error", "nan"),
+        ("--target-error", "small"),
+        ("--threads", "0"),
+        ("--threads", "65535"),
+        ("--seed", "18446744073709551616"),
+        ("--max-scatter", "1000001"),
+        ("--integrator", "photon"),
+        ("--preset", "no-such"),
+        ("--set", "medium.density"),
+        ("--set", "medium..density=1"),
+        ("--set", "lights.5.radiance=1"),
+        ("--set", "lights.first.radiance=1"),
+    ] {
+        options(&[option, value], 2, &[option, value]);
+    }
+    options(&["--quiet", "--verbose"], 2, &["--quiet", "--verbose"]);
+    options(&["--sample", "3"], 2, &["--sample", "--samples"]);
+    for (arguments, says) in [
+        (vec!["render"], "<INPUT>"),
+        (vec!["paint"], "'paint'"),
+        (vec!["completions", "no-such"], "'no-such'"),
+        (vec!["presets", "all"], "'all'"),
+    ] {
+        Fault { files: Vec::new(), arguments, status: 2, says: vec![says] }.check();
+    }
+}
+
+#[test]
+fn a_value_set_to_something_invalid_is_the_inputs_fault() {
+    for (assignment, key) in [
+        ("medium.densty=1", "medium.densty"),
+        ("medium.density=-1", "medium.density"),
+        ("medium.density=dense", "medium.density"),
+        ("medium.density.x=1", "medium.density"),
+        ("lights=[1]", "lights.0"),
+        ("lights.0.radiance=1", "lights.0.type"),
+        ("lights.0.type=point", "lights.0.position"),
+        ("transfer_function.preset=no-such", "transfer_function.preset"),
+        ("transfer_function.points=[]", "transfer_function.points"),
+        ("film.size=[1000000,1000000]", "film.size"),
+        ("render.integrator=photon", "render.integrator"),
+        ("camera.position=[0,0,0]", "camera.position"),
+        ("volume=null", "volume"),
+        ("volume.path=no-such.nrrd", "no-such.nrrd"),
+    ] {
+        options(&["--set", assignment], 1, &[key]);
+    }
+    options(&["--size", "1000000x1000000"], 1, &["film.size", "pixels"]);
+}
+
+#[test]
+fn a_place_that_takes_no_file_is_refused_before_the_work() {
+    for (place, says) in [
+        ("no/such/a.png", "create the folder"),
+        ("a.bmp", ".png"),
+        ("a", ".png"),
+        ("..", ".png"),
+        ("../scene.toml/a.png", "is no folder"),
+        ("../folder.png", "it is a folder"),
+    ] {
+        let files = vec![("scene.toml", SCENE.into()), ("folder.png/file", Vec::new())];
+        let arguments = vec!["render", "../scene.toml", "-o", "good.png", "-o", place];
+        Fault { files, arguments, status: 2, says: vec![place, says] }.check();
+    }
+    // Longer than any file system takes, and told before the work as well.
+    let name: &str = Box::leak(format!("{}.png", "a".repeat(300)).into_boxed_str());
+    options(&["-o", name], 2, &[name, "shorter"]);
+    for place in ["no/such/a.json", "..", "../scene.toml/a.json"] {
+        options(&["--stats", place], 2, &["--stats", place, "statistics"]);
+    }
+    options(&["-o", "-", "-o", "-"], 2, &["`-`", "twice"]);
+    options(&["-o", "-", "--stats", "-"], 2, &["`-`", "twice"]);
+    options(&["-o", "a.png", "--stats", "./a.png"], 2, &["a.png", "twice"]);
+}
+
+#[test]
+fn info_tells_of_faults_as_render_does() {
+    let files = vec![("scene.toml", format!("{SCENE}medium.densty = 1\n").into_bytes())];
+    let arguments = vec!["info", "../scene.toml", "--json"];
+    Fault { files, arguments, status: 1, says: vec!["scene.toml", "medium.densty", "`density`"] }.check();
+    let arguments = vec!["info", "no-such.nrrd"];
+    Fault { files: Vec::new(), arguments, status: 1, says: vec!["no-such.nrrd"] }.check();
+}
+
+#[test]
+fn a_reader_that_goes_away_is_told() {
+    for arguments in [&["schema"][..], &["render", "../scene.toml", "-o", "-"]] {
+        let folder = Folder::new();
+        folder.put("scene.toml", SCENE);
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let ended = folder.tyndall(arguments).stdout(writer).output().expect("the program runs");
+        let stderr = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(1), "{stderr}");
+        assert!(stderr.starts_with("tyndall: standard output: ") && stderr.lines().count() == 1, "{stderr}");
+    }
+}

@@ -1,0 +1,69 @@
+//! Runs the built program in folders that vanish afterwards.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// A run that takes longer hangs: all here take a fraction of a second, on a busy machine a few.
+const HANGS: Duration = Duration::from_secs(60);
+
+/// A folder with the files of a test.
+pub struct Folder(TempDir);
+
+/// How a run ended.
+pub struct Ended {
+    /// The exit status; `None` after a signal.
+    pub status: Option<i32>,
+    pub stdout: Vec<u8>,
+    pub stderr: String,
+}
+
+impl Folder {
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().expect("a temporary folder"))
+    }
+
+    /// The place of `name`, which begins at the folder.
+    pub fn at(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Puts a file there, with the folders that it needs.
+    pub fn put(&self, name: &str, bytes: impl AsRef<[u8]>) {
+        let path = self.at(name);
+        fs::create_dir_all(path.parent().expect("a place in the folder")).expect("a folder");
+        fs::write(path, bytes).expect("a file");
+    }
+
+    /// The program, to be run here, with the folder `out` in this one as its own.
+    pub fn tyndall(&self, arguments: &[&str]) -> Command {
+        let out = self.at("out");
+        fs::create_dir_all(&out).expect("a folder");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tyndall"));
+        command.args(arguments).current_dir(out).stdin(Stdio::null());
+        command
+    }
+
+    /// Runs the program to its end, from the folder `out` in this one.
+    pub fn run(&self, arguments: &[&str]) -> Ended {
+        let [stdout, stderr] = ["stdout", "stderr"].map(|name| self.at(name));
+        let mut command = self.tyndall(arguments);
+        command.stdout(File::create(&stdout).expect("a file")).stderr(File::create(&stderr).expect("a file"));
+        let mut child = command.spawn().expect("the program starts");
+        let begun = Instant::now();
+        let status = loop {
+            if let Some(status) = child.try_wait().expect("a status") {
+                break status.code();
+            }
+            if begun.elapsed() > HANGS {
+                child.kill().expect("it can be ended");
+                panic!("{arguments:?} hangs");
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        };
+        let text = |path: &Path| fs::read(path).expect("a file");
+        Ended { status, stdout: text(&stdout), stderr: String::from_utf8_lossy(&text(&stderr)).into_owned() }
+    }
+}
