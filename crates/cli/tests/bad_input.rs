@@ -163,6 +163,10 @@ fn a_volume_that_cannot_be_had_is_named() {
             "volume = { path = 'eight.raw', raw = { dims = [3, 3, 3], dtype = 'u8' } }",
         ),
         (
+            ["medium.density", "1000"],
+            "volume = { path = 'eight.raw', raw = { dims = [2, 2, 2], dtype = 'u8', spacing = [1e8, 1e8, 1e8] } }",
+        ),
+        (
             ["eight.raw", "spacing"],
             "volume = { path = 'eight.raw', raw = { dims = [2, 2, 2], dtype = 'u8', spacing = [1e99, 1, 1] } }",
         ),

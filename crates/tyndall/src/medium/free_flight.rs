@@ -1,7 +1,8 @@
 //! Free flight and transmittance through matter that varies from place to place.
 //!
 //! Both walk the cells of the [`MajorantGrid`](super::MajorantGrid) and know of each the smallest and
-//! the largest extinction. Where these agree the cell is homogeneous and nothing is looked up.
+//! the largest extinction. Where these agree the cell is homogeneous and nothing is looked up. A step too
+//! short for single precision still goes on by the last place, so that no walk stands still.
 
 use super::{CellStretch, Medium, Track};
 use crate::math::{Vec3, cast};
@@ -40,7 +41,7 @@ impl Medium {
             let mut t = cell.start;
             // False at once in an empty cell, where the step is infinite or 0/0.
             while t + depth / majorant < cell.end {
-                t += depth / majorant;
+                t = (t + depth / majorant).max(t.next_up());
                 let place = track.at(t);
                 let level = stream.uniform() * cell.most;
                 let value = self.volume.value(place);
@@ -76,7 +77,7 @@ impl Medium {
             let majorant = spread * self.density;
             let mut t = cell.start;
             while t + depth / majorant < cell.end {
-                t += depth / majorant;
+                t = (t + depth / majorant).max(t.next_up());
                 let residual = self.transfer.opacity(self.volume.value(track.at(t))) - cell.least;
                 transmittance *= 1.0 - (residual / spread).clamp(0.0, 1.0);
                 if transmittance < ROULETTE_WEIGHT {

@@ -4,7 +4,7 @@ use super::document::{self, Document};
 use super::{Background, IntegratorKind, RenderSettings, Scene};
 use crate::camera::{AutoView, Camera, FitLens, Lens, fit};
 use crate::light::{Directional, Disk, Environment, Light, LightSet, Map, PointLight, Rect, SphereLight};
-use crate::math::{Bounds, Frame, Rgb, Vec3};
+use crate::math::{Bounds, Frame, Rgb, Vec3, cast};
 use crate::medium::{ClipShape, Medium, MediumSettings};
 use crate::scattering::{Abc, Brdf, HenyeyGreenstein, Phase, Schlick};
 use crate::transfer::{Optics, PRESETS, Point, Preset, TransferFunction};
@@ -32,6 +32,9 @@ pub struct SceneError {
     pub problem: String,
 }
 
+/// Optical thickness of a voxel beyond which single precision no longer tells collisions apart.
+const DENSEST: f32 = 1000.0;
+
 fn fault(path: impl Into<String>, problem: impl Display) -> SceneError {
     SceneError { path: path.into(), problem: problem.to_string() }
 }
@@ -44,6 +47,16 @@ impl Scene {
     /// without a frame, a map that was not given.
     pub fn build(document: &Document, assets: &Assets) -> Result<Self, SceneError> {
         let volume = &assets.volume;
+        let thinnest = volume.grid().spacing().into_iter().fold(f64::INFINITY, f64::min);
+        let per_voxel = document.medium.density * cast::single(thinnest);
+        if per_voxel > DENSEST {
+            let problem = format!(
+                "{} makes an optical thickness of {per_voxel:e} per voxel; expected at most {DENSEST}, which \
+                 is opaque within a thousandth of a voxel: lower the density or give the true spacing",
+                document.medium.density
+            );
+            return Err(fault("medium.density", problem));
+        }
         let transfer = Arc::new(transfer(document, volume)?);
         let medium = Medium::new(volume.clone(), transfer, &medium_settings(document)?);
         let up = volume.grid().space().up();
