@@ -124,6 +124,7 @@ fn a_key_at_fault_is_named_with_its_file() {
         ("camera.up", "camera = { position = [0, 0, 9], target = [0, 0, 0], up = [0, 0, 1] }"),
         ("camera.up", "camera = { position = [0, 0, 9], up = [0, 0, 1] }"),
         ("camera.fov", "camera.fov = 180"),
+        ("camera.fov", "camera.fov = 1e-30"),
         ("camera.fov", "camera = { type = 'orthographic', fov = 30 }"),
         ("film.size.0", "film.size = [0, 4]"),
         ("film.size", "film.size = [1000000, 1000000]"),

@@ -243,6 +243,11 @@ fn bare_volumes_of_odd_kinds_are_never_black() {
             "type: uchar\ndimension: 3\nsizes: 2 2 2\nspacings: 1000000 1000000 1000000",
             (0..8).collect(),
         ),
+        (
+            "vaster",
+            "type: uchar\ndimension: 3\nsizes: 2 2 2\nspacings: 10000000000 10000000000 10000000000",
+            (0..8).collect(),
+        ),
         ("tiny", "type: uchar\ndimension: 3\nsizes: 2 2 2\nspacings: 1e-9 1e-9 1e-9", (0..8).collect()),
         ("flat", "type: uchar\ndimension: 3\nsizes: 2 2 2\nspacings: 1000 1 0.001", (0..8).collect()),
     ] {

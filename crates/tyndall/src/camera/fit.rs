@@ -1,6 +1,6 @@
 //! A camera that fits a volume into the picture by itself.
 
-use super::{Camera, Lens};
+use super::{Camera, Lens, upright};
 use crate::math::Vec3;
 use crate::volume::{Grid, Space};
 
@@ -68,7 +68,8 @@ pub fn fit(grid: &Grid, view: AutoView, up: Option<Vec3>, lens: FitLens, size: [
     let up = chosen_up.filter(|up| up.cross(outwards).length() > 1e-3 * up.length()).unwrap_or(up);
 
     let middle = grid.world_bounds().center();
-    let frame = Camera::new(middle + outwards, middle, up, Lens::Orthographic { height: 1.0 }).frame;
+    // From the directions alone: far from the origin, or far from the volume, places would have lost them.
+    let frame = upright(-outwards, up);
     let corners = grid.world_corners().map(|corner| frame.to_local(corner - middle));
     let aspect = size[0] as f32 / size[1] as f32;
     // Half the picture's height that a corner needs where it stands.
@@ -88,7 +89,7 @@ pub fn fit(grid: &Grid, view: AutoView, up: Option<Vec3>, lens: FitLens, size: [
             (2.0 * most(&|corner| corner.length()), Lens::Orthographic { height })
         }
     };
-    Camera::new(middle + outwards * distance, middle, up, lens)
+    Camera { position: middle + outwards * distance, frame, lens }
 }
 
 #[cfg(test)]

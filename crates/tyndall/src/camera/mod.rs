@@ -42,11 +42,7 @@ impl Camera {
     /// If position and target coincide or `up` lies along the view.
     #[must_use]
     pub fn new(position: Vec3, target: Vec3, up: Vec3, lens: Lens) -> Self {
-        let w = (target - position).normalize();
-        let u = w.cross(up.normalize());
-        assert!(u.length() > 1e-6, "a camera at {position} to {target} with up {up} has no frame");
-        let u = u.normalize();
-        Self { position, frame: Frame { u, v: u.cross(w), w }, lens }
+        Self { position, frame: upright(target - position, up), lens }
     }
 
     /// Where it stands.
@@ -94,6 +90,15 @@ impl Camera {
             }
         }
     }
+}
+
+/// The frame of a picture that looks along `view` with `up` upwards; directions of any length but zero.
+fn upright(view: Vec3, up: Vec3) -> Frame {
+    let w = view.normalize();
+    let u = w.cross(up.normalize());
+    assert!(u.length() > 1e-6, "a view along {view} with up {up} has no frame");
+    let u = u.normalize();
+    Frame { u, v: u.cross(w), w }
 }
 
 #[cfg(test)]

@@ -35,6 +35,9 @@ pub struct SceneError {
 /// Optical thickness of a voxel beyond which single precision no longer tells collisions apart.
 const DENSEST: f32 = 1000.0;
 
+/// Places beyond this leave no room for single precision.
+const FARTHEST: f32 = 1e18;
+
 fn fault(path: impl Into<String>, problem: impl Display) -> SceneError {
     SceneError { path: path.into(), problem: problem.to_string() }
 }
@@ -205,7 +208,13 @@ fn camera(document: &Document, volume: &Volume) -> Result<Camera, SceneError> {
             }
             document::Camera::Orthographic { height, .. } => FitLens::Orthographic { height },
         };
-        return Ok(fit(grid, view, up, lens, document.film.size));
+        let camera = fit(grid, view, up, lens, document.film.size);
+        let place = camera.position();
+        if !place.is_finite() || place.length() > FARTHEST {
+            let problem = format!("the volume fits from {place} only; expected a wider field of view");
+            return Err(fault("camera.fov", problem));
+        }
+        return Ok(camera);
     };
     let target = given.target().map_or_else(|| grid.world_bounds().center(), Vec3::from_array);
     let view = target - position;
