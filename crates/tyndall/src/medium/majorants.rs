@@ -71,82 +71,63 @@ impl MajorantGrid {
             cast::floor_i32(entry.z).clamp(0, nz - 1),
         ];
         let strides = [1, nx as isize, nx as isize * ny as isize];
-        let mut next = [f32::INFINITY; 3];
-        let mut inverse = [f32::INFINITY; 3];
-        let mut sign = [0_i32; 3];
-        for axis in 0..3 {
-            let d = direction[axis];
-            if d != 0.0 {
-                inverse[axis] = d.recip();
-                sign[axis] = if d > 0.0 { 1 } else { -1 };
-                next[axis] = ((place[axis] + i32::from(d > 0.0)) as f32 - entry[axis]) * inverse[axis];
-            }
-        }
-        let mut cell = place[0] as isize + place[1] as isize * strides[1] + place[2] as isize * strides[2];
+        let number = |[x, y, z]: [i32; 3]| {
+            (x as isize + y as isize * strides[1] + z as isize * strides[2]).cast_unsigned()
+        };
+        let sign = [0, 1, 2].map(|a| i32::from(direction[a] > 0.0) - i32::from(direction[a] < 0.0));
+        let inverse = [0, 1, 2].map(|a| direction[a].recip());
+        // Where the ray leaves the cells up to `last` along an axis.
+        let exit = |axis: usize, last: i32| match sign[axis] {
+            0 => f32::INFINITY,
+            forward => ((last + i32::from(forward > 0)) as f32 - entry[axis]) * inverse[axis],
+        };
+        let mut next = [0, 1, 2].map(|axis| exit(axis, place[axis]));
         let mut start = 0.0_f32;
         loop {
-            let reach = i32::from(self.reach[cell.cast_unsigned()]);
-            if reach > 0 {
-                // Across all alike cells at once, and into the cell behind them.
-                let mut leave = f32::INFINITY;
-                let mut through = 0;
-                for axis in 0..3 {
-                    let border = place[axis] + i32::from(sign[axis] > 0) + reach * sign[axis];
-                    let t = (border as f32 - entry[axis]) * inverse[axis];
-                    if sign[axis] != 0 && t < leave {
-                        (leave, through) = (t, axis);
-                    }
-                }
-                let end = leave.min(track.length);
-                if end > start {
-                    let [least, most] = self.opacities[cell.cast_unsigned()];
-                    visit(CellStretch { start, end, least, most })?;
-                    start = end;
-                }
-                if start >= track.length {
-                    return ControlFlow::Continue(());
-                }
-                let there = entry + direction * leave;
-                for axis in 0..3 {
-                    let moved = if axis == through {
-                        place[axis] + sign[axis] * (reach + 1)
-                    } else {
-                        cast::floor_i32(there[axis]).clamp(place[axis] - reach, place[axis] + reach)
-                    };
-                    place[axis] = moved;
-                    if moved < 0 || moved >= self.dims[axis] {
-                        return ControlFlow::Continue(());
-                    }
-                    if sign[axis] != 0 {
-                        next[axis] =
-                            ((moved + i32::from(sign[axis] > 0)) as f32 - entry[axis]) * inverse[axis];
-                    }
-                }
-                cell = place[0] as isize + place[1] as isize * strides[1] + place[2] as isize * strides[2];
-                continue;
-            }
-            let axis = if next[0] < next[1] {
-                if next[0] < next[2] { 0 } else { 2 }
-            } else if next[1] < next[2] {
-                1
+            let cell = number(place);
+            let reach = i32::from(self.reach[cell]);
+            let (through, leave) = if reach == 0 {
+                nearest(next)
             } else {
-                2
+                nearest([0, 1, 2].map(|axis| exit(axis, place[axis] + reach * sign[axis])))
             };
-            let end = next[axis].min(track.length);
+            let end = leave.min(track.length);
             if end > start {
-                let [least, most] = self.opacities[cell.cast_unsigned()];
+                let [least, most] = self.opacities[cell];
                 visit(CellStretch { start, end, least, most })?;
                 start = end;
             }
             if start >= track.length {
                 return ControlFlow::Continue(());
             }
-            place[axis] += sign[axis];
-            if place[axis] < 0 || place[axis] >= self.dims[axis] {
+            if reach > 0 {
+                // Across all alike cells at once: the other axes have moved on as well.
+                let there = entry + direction * leave;
+                for axis in (0..3).filter(|&axis| axis != through) {
+                    let (first, last) = (place[axis] - reach, place[axis] + reach);
+                    place[axis] =
+                        cast::floor_i32(there[axis]).clamp(first.max(0), last.min(self.dims[axis] - 1));
+                    next[axis] = exit(axis, place[axis]);
+                }
+            }
+            place[through] += sign[through] * (reach + 1);
+            if place[through] < 0 || place[through] >= self.dims[through] {
                 return ControlFlow::Continue(());
             }
-            cell += strides[axis] * sign[axis] as isize;
-            next[axis] = ((place[axis] + i32::from(sign[axis] > 0)) as f32 - entry[axis]) * inverse[axis];
+            next[through] = exit(through, place[through]);
         }
     }
+}
+
+/// The axis whose border comes first, and where.
+#[inline]
+fn nearest(borders: [f32; 3]) -> (usize, f32) {
+    let axis = if borders[0] < borders[1] {
+        if borders[0] < borders[2] { 0 } else { 2 }
+    } else if borders[1] < borders[2] {
+        1
+    } else {
+        2
+    };
+    (axis, borders[axis])
 }

@@ -48,3 +48,39 @@ pub fn around_z(z: f32, u: f32) -> Vec3 {
     let (sin, cos) = (TAU * u).sin_cos();
     Vec3::new(r * cos, r * sin, z)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::cast;
+    use tyndall_testing::{ChiSquare, SplitMix};
+
+    #[test]
+    fn directions_follow_their_densities() {
+        let check = |warp: &dyn Fn([f32; 2]) -> Vec3, pdf: &dyn Fn([f32; 3]) -> f32| {
+            let sample = |u: [f32; 2]| Some(warp(u).to_array());
+            ChiSquare::of(4).directions(sample, |w| f64::from(pdf(w))).assert();
+        };
+        check(&sphere, &|_| 0.25 / PI);
+        check(&cosine_hemisphere, &|w| w[2].max(0.0) / PI);
+        for cos_max in [0.9, -0.3] {
+            let inside = 1.0 / (TAU * (1.0 - cos_max));
+            check(&|u| cone(u, cos_max), &|w| if w[2] >= cos_max { inside } else { 0.0 });
+        }
+    }
+
+    /// Equal areas: rings between radii sqrt(i / 8), each cut into 8 sectors.
+    #[test]
+    fn points_fill_the_disk_evenly() {
+        let mut counts = [0_u64; 64];
+        let mut random = SplitMix::new(5);
+        for _ in 0..1_000_000 {
+            let [x, y] = disk(random.uniforms());
+            let ring = cast::index((x * x + y * y) * 8.0).min(7);
+            let sector = cast::index((y.atan2(x) / TAU + 0.5) * 8.0).min(7);
+            counts[ring * 8 + sector] += 1;
+        }
+        let even = [1.0 / 64.0; 64];
+        ChiSquare::default().discrete(&even, &counts).assert();
+    }
+}
