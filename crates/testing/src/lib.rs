@@ -12,6 +12,7 @@
 //! | an estimate against a known answer | [`Mean::against`], then [`ZTest::assert`] or [`ZTest::assert_within`] |
 //! | a picture against another | [`Picture::compare`], then [`Comparison::assert`] |
 //! | the known answer itself, where it is an integral | [`quadrature`] |
+//! | that no input breaks a reader | [`damage`], [`within_limits`] |
 //!
 //! Seeds are fixed, so a pass stays a pass. A test that judges many things at once (ten mean cosines, all pixels
 //! of a picture) says so, and the significance of each is corrected so that the whole keeps its own.
@@ -47,8 +48,10 @@
 
 mod cast;
 mod chi_square;
+pub mod damage;
 mod failure;
 mod fit;
+mod limits;
 mod picture;
 pub mod quadrature;
 mod significance;
@@ -58,6 +61,7 @@ mod z_test;
 
 pub use chi_square::ChiSquare;
 pub use fit::{Fault, Fit};
+pub use limits::within_limits;
 pub use picture::{Comparison, Picture, Worst};
 pub use significance::{SIGNIFICANCE, sidak};
 pub use split_mix::SplitMix;
