@@ -40,6 +40,8 @@ pub enum Command {
     Render(Box<RenderOptions>),
     /// Tell what the loader understands of a volume or of a scene's volume
     Info(InfoOptions),
+    /// Measure this machine: speed as ratios, latency, growth
+    Bench(BenchOptions),
     /// List the transfer-function presets
     Presets,
     /// Print the JSON Schema of the scene document
@@ -137,6 +139,31 @@ pub struct InfoOptions {
     /// As JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// Options of `bench`.
+#[derive(Debug, Group)]
+pub struct BenchOptions {
+    /// Which tables
+    #[arg(value_enum, default_value = "all")]
+    pub name: BenchName,
+
+    /// As JSON, all at the end
+    #[arg(long)]
+    pub json: bool,
+
+    /// Smaller sizes, once each: shows that it works, measures nothing
+    #[arg(long)]
+    pub quick: bool,
+}
+
+/// Sets of tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BenchName {
+    /// What the path tracer and the ray marcher stand on
+    Core,
+    /// All there are
+    All,
 }
 
 /// Methods by name.

@@ -5,6 +5,7 @@ use crate::input::Input;
 use crate::{Failure, say};
 use serde_json::json;
 use std::fmt::Write;
+use tyndall::message::sentence;
 use tyndall::scene::document::FieldKind;
 use tyndall::transfer::Preset;
 use tyndall::volume::procedural::MATERIALS;
@@ -16,7 +17,7 @@ const BINS: usize = 256;
 
 /// Prints what is known of a volume.
 pub fn run(options: &InfoOptions) -> Result<(), Failure> {
-    let input = Input::open(&options.file)?;
+    let mut input = Input::open(&options.file)?;
     let (document, assets, source) = input.load(&options.file)?;
     let volume = &*assets.volume;
     if options.json {
@@ -38,7 +39,7 @@ fn as_json(volume: &Volume, source: &Source) -> serde_json::Value {
     let histogram = volume.histogram(volume.value_range(), BINS);
     json!({
         "dims": grid.dims(),
-        "type": volume.voxels().type_name(),
+        "type": volume.type_name(),
         "spacing": grid.spacing(),
         "direction": grid.direction(),
         "origin": grid.origin(),
@@ -79,7 +80,7 @@ fn as_text(volume: &Volume, source: &Source) -> String {
          values     {lo} to {hi}; without outliers {robust_lo} to {robust_hi}\n\
          channels   {}, time steps {}\n\
          preset     {}\n",
-        volume.voxels().type_name(),
+        volume.type_name(),
         size.x,
         size.y,
         size.z,
@@ -90,11 +91,11 @@ fn as_text(volume: &Volume, source: &Source) -> String {
         Preset::for_volume(volume).name,
     );
     if volume.non_finite() > 0 {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "not finite {} samples, read as the smallest value", volume.non_finite());
+        let how = "NaN is read as the smallest value, an infinity as the value nearest to it";
+        let _ = writeln!(text, "not finite {} samples; {how}", volume.non_finite());
     }
     for note in &source.notes {
-        let _ = writeln!(text, "note       {note}");
+        let _ = writeln!(text, "note       {}", sentence(note));
     }
     text
 }

@@ -4,6 +4,7 @@ use crate::Failure;
 use crate::args::RenderOptions;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use tyndall::message::{excerpt, place};
 use tyndall::scene::Assets;
 use tyndall::scene::document::{self, Document};
 use tyndall_formats::assets::{self, AssetError};
@@ -25,6 +26,9 @@ const BARE_THICKNESS: f32 = 200.0;
 /// Text documents larger than this are no scenes.
 const LARGEST_DOCUMENT: u64 = 256 << 20;
 
+/// Memory that a byte of text may become: a million lights were seen to take 33 times their text.
+const MEMORY_PER_BYTE: u64 = 40;
+
 impl Input {
     /// Finds out what INPUT is: a scene by its extension, a picture with a scene inside, or a volume.
     pub fn open(path: &Path) -> Result<Self, Failure> {
@@ -40,7 +44,7 @@ impl Input {
                     Failure::input(format!(
                         "{}: a picture without a scene in its metadata; expected one that Tyndall made, a scene \
                          (.toml, .json) or a volume",
-                        path.display()
+                        place(path)
                     ))
                 })?;
                 scene(in_file(path, document::value_from_json(text))?)
@@ -49,11 +53,11 @@ impl Input {
                 let name = path.file_name().ok_or_else(|| {
                     Failure::input(format!(
                         "{}: expected a file: a scene, a picture or a volume",
-                        path.display()
+                        place(path)
                     ))
                 })?;
                 let name = name.to_str().ok_or_else(|| {
-                    Failure::input(format!("{}: a name that is no Unicode; rename the file", path.display()))
+                    Failure::input(format!("{}: a name that is no Unicode; rename the file", place(path)))
                 })?;
                 Ok(Self { value: json!({ "volume": { "path": name } }), folder, bare: true })
             }
@@ -64,7 +68,7 @@ impl Input {
     pub fn override_with(&mut self, options: &RenderOptions) -> Result<(), Failure> {
         for assignment in &options.set {
             document::set(&mut self.value, assignment)
-                .map_err(|e| Failure::usage(format!("--set {assignment}: {e}")))?;
+                .map_err(|e| Failure::usage(format!("--set {}: {e}", excerpt(assignment))))?;
         }
         let mut patch = json!({});
         if let Some(integrator) = options.integrator {
@@ -92,15 +96,16 @@ impl Input {
         Ok(())
     }
 
-    /// Checks the document and reads what it names.
-    pub fn load(&self, path: &Path) -> Result<(Document, Assets, assets::Source), Failure> {
-        let mut document = in_file(path, Document::from_value(self.value.clone()))?;
+    /// Checks the document and reads what it names; its value is gone then, which of a million lights is a gigabyte.
+    pub fn load(&mut self, path: &Path) -> Result<(Document, Assets, assets::Source), Failure> {
+        let thickness_is_free = self.bare && self.value.pointer("/medium/density").is_none();
+        let mut document = in_file(path, Document::from_value(self.value.take()))?;
         let (assets, source) = assets::load(&document, &self.folder).map_err(|e| match e {
             AssetError::Volume(_) => Failure::input(e),
             // Of the others each begins with a key.
-            _ => Failure::input(format!("{}: {e}", path.display())),
+            _ => Failure::input(format!("{}: {e}", place(path))),
         })?;
-        if self.bare && self.value.pointer("/medium/density").is_none() {
+        if thickness_is_free {
             document.medium.density = BARE_THICKNESS / assets.volume.grid().diagonal();
         }
         Ok((document, assets, source))
@@ -109,11 +114,11 @@ impl Input {
 
 /// Says of which file the trouble is.
 fn in_file<T>(path: &Path, result: Result<T, document::DocumentError>) -> Result<T, Failure> {
-    result.map_err(|e| Failure::input(format!("{}: {e}", path.display())))
+    result.map_err(|e| Failure::input(format!("{}: {e}", place(path))))
 }
 
 fn read_text(path: &Path) -> Result<String, Failure> {
-    let fail = |problem: &dyn std::fmt::Display| Failure::input(format!("{}: {problem}", path.display()));
+    let fail = |problem: &dyn std::fmt::Display| Failure::input(format!("{}: {problem}", place(path)));
     let unreadable = |e| fail(&format!("cannot be read: {e}; check the path"));
     let about = std::fs::metadata(path).map_err(unreadable)?;
     if !about.is_file() {
@@ -121,6 +126,15 @@ fn read_text(path: &Path) -> Result<String, Failure> {
     }
     if about.len() > LARGEST_DOCUMENT {
         return Err(fail(&format!("{} bytes; a scene document has at most {LARGEST_DOCUMENT}", about.len())));
+    }
+    let needed = about.len().saturating_mul(MEMORY_PER_BYTE);
+    if let Some(available) = tyndall_formats::memory::available().filter(|&available| needed > available) {
+        return Err(fail(&format!(
+            "a scene document of {} MiB takes up to {} MiB of memory, but {} MiB are free; expected a smaller one",
+            about.len() >> 20,
+            needed >> 20,
+            available >> 20
+        )));
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
     String::from_utf8(bytes).map_err(|e| {

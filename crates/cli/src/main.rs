@@ -1,6 +1,7 @@
 //! The program `tyndall`: parses, calls the library, and shows. No algorithm lives here.
 
 mod args;
+mod bench;
 mod failure;
 mod info;
 mod input;
@@ -16,13 +17,15 @@ use failure::Failure;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 use std::time::Instant;
+use tyndall::message::excerpt;
 
 fn main() -> ExitCode {
     let started = Instant::now();
-    let args = Args::parse();
+    let args = Args::try_parse().unwrap_or_else(|error| refuse(&error));
     let done = match args.command {
         Command::Render(options) => render::run(&options, started),
         Command::Info(options) => info::run(&options),
+        Command::Bench(options) => bench::run(&options),
         Command::Presets => lists::presets(),
         Command::Schema => lists::schema(),
         Command::Completions { shell } => {
@@ -41,6 +44,17 @@ fn main() -> ExitCode {
             failure.exit_code()
         }
     }
+}
+
+/// Ends the program as clap would, only that words of the command line are shown as in all messages: short, and
+/// without what would move the cursor.
+fn refuse(error: &clap::Error) -> ! {
+    let mut words = std::env::args_os();
+    let program = words.next();
+    let shown = words.map(|word| excerpt(&word.to_string_lossy()).into());
+    let shown = program.into_iter().chain(shown);
+    // The same fault, in words that can be shown.
+    Args::try_parse_from(shown).err().as_ref().unwrap_or(error).exit()
 }
 
 /// Writes to stdout; a closed pipe is a failure with a message, not a panic.

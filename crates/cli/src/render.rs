@@ -13,8 +13,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tyndall::film::Film;
+use tyndall::message::{place, sentence};
 use tyndall::scene::Scene;
 use tyndall::session::{Budget, Session};
+use tyndall::simd::Level;
 
 /// How often progress is looked at.
 const SLICE: Duration = Duration::from_millis(100);
@@ -42,6 +44,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let mut stages = Stages::new(started);
     let interrupt = Interrupt::listen();
     let threads = pool(options.threads)?;
+    let level = vector_instructions()?;
     let mut input = Input::open(&options.input)?;
     let places = output::places(&options.outputs, &options.input);
     output::check(&places, options.stats.as_deref())?;
@@ -52,17 +55,18 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     refuse_film_that_does_not_fit(document.film.size, &options.input)?;
     let scene = threads
         .install(|| Scene::build(&document, &assets))
-        .map_err(|e| Failure::input(format!("{}: {e}", options.input.display())))?;
+        .map_err(|e| Failure::input(format!("{}: {e}", place(&options.input))))?;
     if !options.quiet {
         for text in source.notes.iter().map(String::as_str).chain(scene.notes()) {
-            drop(writeln!(std::io::stderr(), "tyndall: note: {text}"));
+            drop(writeln!(std::io::stderr(), "tyndall: note: {}", sentence(text)));
         }
     }
-    let mut session = Session::new(scene, threads.clone());
+    let mut session = Session::with_level(scene, threads.clone(), level);
     let prepared = stages.end("prepare");
     note(&format!(
-        "loaded in {load_s:.2} s, prepared in {prepared:.2} s, {} threads",
-        threads.current_num_threads()
+        "loaded in {load_s:.2} s, prepared in {prepared:.2} s, {} threads, {}",
+        threads.current_num_threads(),
+        level.name()
     ));
 
     let limited = options.time.is_some() || options.target_error.is_some();
@@ -98,6 +102,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
             "relative_error": session.relative_error(),
             "peak_memory_bytes": peak_memory(),
             "threads": threads.current_num_threads(),
+            "simd": level.name(),
             "seed": document.render.seed,
         });
         output::statistics(place, &statistics)?;
@@ -152,6 +157,16 @@ fn refine(session: &mut Session, stop: &Stop, cancel: &Arc<AtomicBool>, mut disp
     display.finish();
 }
 
+/// The widest vector instructions, or those that `TYNDALL_SIMD` names.
+pub fn vector_instructions() -> Result<Level, Failure> {
+    match std::env::var_os("TYNDALL_SIMD") {
+        None => Ok(Level::best()),
+        Some(name) => name.to_string_lossy().parse().map_err(|e| {
+            Failure::usage(format!("TYNDALL_SIMD: {e}; name one of these, or unset it for the best"))
+        }),
+    }
+}
+
 fn pool(threads: Option<u16>) -> Result<Arc<rayon::ThreadPool>, Failure> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads.map_or(0, usize::from))
@@ -175,6 +190,7 @@ impl Interrupt {
         // Without a handler Ctrl-C still ends the program, only without a picture.
         drop(ctrlc::set_handler(move || {
             if !heard.asks.load(Ordering::Relaxed) || heard.asked.swap(true, Ordering::Relaxed) {
+                let _nothing_half_written = tyndall_formats::atomic::abandon();
                 std::process::exit(130);
             }
         }));
@@ -192,7 +208,7 @@ fn refuse_film_that_does_not_fit(size: [u32; 2], input: &Path) -> Result<(), Fai
     match tyndall_formats::memory::available() {
         Some(available) if needed > available => Err(Failure::input(format!(
             "{}: film.size: {} x {} pixels need {} MiB, but {} MiB are free; expected a smaller picture",
-            input.display(),
+            place(input),
             size[0],
             size[1],
             needed >> 20,

@@ -24,7 +24,7 @@ fn with_scene(text: &str) -> Folder {
 
 /// Runs what must go well; returns what it printed.
 fn run(folder: &Folder, arguments: &[&str]) -> Vec<u8> {
-    let Ended { status, stdout, stderr } = folder.run(arguments);
+    let Ended { status, stdout, stderr, .. } = folder.run(arguments);
     assert_eq!((status, stderr.as_str()), (Some(0), ""), "{arguments:?}");
     stdout
 }
@@ -258,6 +258,65 @@ fn bare_volumes_of_odd_kinds_are_never_black() {
         let (_, _, pixels) = decode(&written(&folder, "a.png"));
         assert!(pixels.iter().any(|&x| x > 20), "{name}: {pixels:?}");
     }
+}
+
+/// What `info` tells of samples that are no numbers: how many, and that NaN and minus infinity count as the
+/// smallest value, infinity as the largest.
+#[test]
+fn samples_that_are_no_numbers_are_counted_and_read_as_an_end_of_the_range() {
+    let values = [f64::NAN, 2.0, f64::INFINITY, 3.0, f64::NEG_INFINITY, 4.0, 2.0, 3.5];
+    #[expect(clippy::cast_possible_truncation, reason = "short numbers")]
+    let single = values.map(|v| (v as f32).to_le_bytes()).concat();
+    let double = values.map(f64::to_le_bytes).concat();
+    for (kind, name, samples) in [("float", "f32", single), ("double", "f64", double)] {
+        let folder = Folder::new();
+        let head =
+            format!("NRRD0004\ntype: {kind}\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nendian: little\n\n");
+        folder.put("a.nrrd", [head.as_bytes(), &samples].concat());
+        let told = json(&run(&folder, &["info", "../a.nrrd", "--json"]));
+        assert_eq!(told["type"], name, "{told}");
+        assert_eq!(told["non_finite"], 3, "{told}");
+        assert_eq!(told["value_range"], serde_json::json!([2.0, 4.0]), "{told}");
+        let counts: Vec<u64> = serde_json::from_value(told["histogram"]["counts"].clone()).expect("numbers");
+        assert_eq!((counts[0], counts[255], counts.iter().sum::<u64>()), (4, 2, 8), "{told}");
+        let text = String::from_utf8(run(&folder, &["info", "../a.nrrd"])).expect("UTF-8");
+        assert!(text.contains("not finite 3 samples; NaN is read as the smallest value"), "{text}");
+        assert!(text.contains("values     2 to 4;"), "{text}");
+    }
+}
+
+#[test]
+fn the_brightest_light_still_has_a_mean_and_an_error() {
+    let folder = with_scene(&format!("{SCENE}lights = [{{ type = 'environment', radiance = 1e18 }}]\n"));
+    let told = statistics(&folder, &[]);
+    let mean = told["mean_radiance"][0].as_f64().unwrap_or_else(|| panic!("a mean in {told}"));
+    assert!((1e17..=1.1e18).contains(&mean), "{told}");
+    assert!(told["relative_error"].as_f64().is_some_and(f64::is_finite), "{told}");
+}
+
+#[test]
+fn marks_and_line_ends_of_other_systems_are_no_fault() {
+    let folder = with_scene(&format!("\u{feff}{}", SCENE.replace('\n', "\r\n")));
+    run(&folder, &["render", "../scene.toml"]);
+    folder.put("scene.json", "\u{feff}{\r\n\"volume\": {\"procedural\": {\"size\": [4, 4, 4]}},\r\n\"film\": {\"size\": [4, 4]}}\r\n");
+    run(&folder, &["render", "../scene.json", "--samples", "1"]);
+}
+
+/// As many lights as a program may write: they cost memory in proportion, and no time to speak of.
+#[test]
+fn a_hundred_thousand_lights_are_rendered() {
+    let light =
+        "{\"type\": \"sphere\", \"position\": [-9.123456, 0.5, 1e1], \"radius\": 1, \"radiance\": [1, 2, 3]}";
+    let lights = vec![light; 100_000].join(",\n");
+    let folder = Folder::new();
+    folder.put(
+        "scene.json",
+        format!("{{\"volume\": {{\"procedural\": {{\"size\": [4, 4, 4]}}}}, \"lights\": [{lights}]}}"),
+    );
+    let arguments = ["render", "../scene.json", "--size", "4x4", "--samples", "1"];
+    let Ended { status, stderr, took, memory, .. } = folder.run(&arguments);
+    assert_eq!(status, Some(0), "{stderr}");
+    assert!(took < std::time::Duration::from_secs(30) && memory < 1 << 30, "{took:?}, {} MiB", memory >> 20);
 }
 
 #[test]

@@ -6,10 +6,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tyndall::light::{Map, MapError};
+use tyndall::message::place;
 use tyndall::scene::Assets;
 use tyndall::scene::document::{self, Document};
 use tyndall::volume::procedural::{Field, Kind};
-use tyndall::volume::{GridError, Interpolation};
+use tyndall::volume::{Bricks, GridError, Interpolation};
 
 /// What a volume's source said beside the volume.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,7 +51,7 @@ pub enum AssetError {
         source: ImageError,
     },
     /// An environment map's content.
-    #[error("`lights.{light}.map`: {}: {source}", .path.display())]
+    #[error("`lights.{light}.map`: {}: {source}", place(.path))]
     Map {
         /// Number of the light.
         light: usize,
@@ -112,7 +113,8 @@ fn field(described: &document::Procedural) -> Result<(tyndall::volume::Volume, S
         document::FieldKind::CornellBox => Kind::CornellBox,
     };
     let dims = described.size.map(|n| n as usize);
-    let needed = dims.iter().fold(4_u64, |bytes, &n| bytes.saturating_mul(n as u64));
+    let linear = dims.iter().fold(4_u64, |bytes, &n| bytes.saturating_mul(n as u64));
+    let needed = linear.saturating_add(Bricks::bytes(dims, 4).unwrap_or(u64::MAX));
     if let Some(available) = crate::memory::available().filter(|&available| needed > available) {
         return Err(AssetError::Memory { dims, needed, available });
     }

@@ -3,16 +3,27 @@
 use std::fs::{self, File, OpenOptions};
 use std::io::{Error, ErrorKind, Result, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Puts `bytes` at `path`: written to a file beside it first, then moved over what was there.
+/// Unfinished files, which must not outlive the process. Held while one appears, is moved or goes.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Puts `bytes` at `path`: written to a file beside it first, then moved over what was there. A device or a pipe gets
+/// the bytes themselves.
 ///
 /// # Errors
 /// What the system says; nothing half-written is left behind.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
-    let path = destination(path)?;
+    let path = match destination(path)? {
+        Destination::File(path) => path,
+        // Nothing is cut off that stands there already: it may be a log.
+        Destination::Stream => return OpenOptions::new().append(true).open(path)?.write_all(bytes),
+    };
     let (beside, mut file) = create_beside(&path)?;
     let written = file.write_all(bytes).and_then(|()| file.sync_all());
     drop(file);
+    let mut unfinished = unfinished();
+    unfinished.retain(|other| *other != beside);
     let moved = written.and_then(|()| fs::rename(&beside, &path));
     if moved.is_err() {
         // The first failure is the one to tell; a file that cannot be removed either is at least not the picture.
@@ -26,20 +37,51 @@ pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
 /// # Errors
 /// What the system or a look at the place says against it.
 pub fn check(path: &Path) -> Result<()> {
-    let (beside, file) = create_beside(&destination(path)?)?;
+    // A stream is not opened to see: that could wait for the one who reads it.
+    let Destination::File(path) = destination(path)? else { return Ok(()) };
+    let (beside, file) = create_beside(&path)?;
     drop(file);
+    let mut unfinished = unfinished();
+    unfinished.retain(|other| *other != beside);
     fs::remove_file(beside)
 }
 
-/// Where the bytes go: through links, and never over a folder, a device or a protected file.
-fn destination(path: &Path) -> Result<PathBuf> {
-    let existing = match path.canonicalize() {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(path.to_owned()),
+/// Removes every unfinished file. While the returned value lives, no other appears and none is finished, so that the
+/// process can end without leaving one behind.
+#[must_use = "files appear again when it is dropped"]
+pub fn abandon() -> impl Drop {
+    let mut unfinished = unfinished();
+    for beside in unfinished.drain(..) {
+        // The process is about to end; there is nobody to tell.
+        drop(fs::remove_file(beside));
+    }
+    unfinished
+}
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    // A list of paths is whole at all times.
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What stands where bytes shall go.
+enum Destination {
+    /// A file, or nothing yet.
+    File(PathBuf),
+    /// A device or a pipe, or whatever stands behind `/dev/stdout`.
+    Stream,
+}
+
+/// Where the bytes go: through links, and never over a folder, a disk or a protected file.
+fn destination(path: &Path) -> Result<Destination> {
+    let about = match path.metadata() {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Destination::File(path.to_owned())),
         found => found?,
     };
-    let about = existing.metadata()?;
     if about.is_dir() {
         return Err(Error::new(ErrorKind::IsADirectory, "it is a folder"));
+    }
+    if is_stream(about.file_type()) || (about.is_file() && path.starts_with("/dev")) {
+        return Ok(Destination::Stream);
     }
     if !about.is_file() {
         return Err(Error::new(ErrorKind::InvalidInput, "it is not a regular file"));
@@ -47,17 +89,32 @@ fn destination(path: &Path) -> Result<PathBuf> {
     if about.permissions().readonly() {
         return Err(Error::new(ErrorKind::PermissionDenied, "the file there is write-protected"));
     }
-    Ok(existing)
+    path.canonicalize().map(Destination::File)
+}
+
+#[cfg(unix)]
+fn is_stream(kind: fs::FileType) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    kind.is_char_device() || kind.is_fifo()
+}
+
+#[cfg(not(unix))]
+fn is_stream(_kind: fs::FileType) -> bool {
+    false
 }
 
 fn create_beside(path: &Path) -> Result<(PathBuf, File)> {
     let folder = folder_of(path);
     for attempt in 0_u32.. {
         let beside = folder.join(format!(".tyndall-{}-{attempt}.part", std::process::id()));
+        let mut unfinished = unfinished();
         match OpenOptions::new().write(true).create_new(true).open(&beside) {
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
             Err(error) => return Err(error),
-            Ok(file) => return Ok((beside, file)),
+            Ok(file) => {
+                unfinished.push(beside.clone());
+                return Ok((beside, file));
+            }
         }
     }
     Err(Error::new(ErrorKind::AlreadyExists, "the folder is full of unfinished pictures"))
@@ -66,4 +123,42 @@ fn create_beside(path: &Path) -> Result<(PathBuf, File)> {
 /// The folder that a file lies in.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect()
+    }
+
+    #[test]
+    fn nothing_unfinished_outlives_an_early_end() {
+        let folder = tempfile::tempdir().unwrap();
+        let (_, mut file) = create_beside(&folder.path().join("a.png")).unwrap();
+        file.write_all(b"half").unwrap();
+        assert_eq!(names(folder.path()).len(), 1);
+        let ending = abandon();
+        assert!(names(folder.path()).is_empty());
+
+        // Who writes meanwhile waits.
+        let place = folder.path().join("b.png");
+        let writer = std::thread::spawn(move || replace(&place, b"whole"));
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        assert!(names(folder.path()).is_empty());
+        drop(ending);
+        writer.join().unwrap().unwrap();
+        assert_eq!(names(folder.path()), ["b.png"]);
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_device_takes_the_bytes_itself() {
+        assert!(check(Path::new("/dev/null")).is_ok() && replace(Path::new("/dev/null"), b"text").is_ok());
+        assert!(!fs::metadata("/dev/null").unwrap().is_file());
+        let error = replace(Path::new("/dev/full"), b"text").unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::StorageFull);
+    }
 }

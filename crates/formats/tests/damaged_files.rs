@@ -5,6 +5,7 @@ use flate2::{Compression, write::GzEncoder, write::ZlibEncoder};
 use std::io::Write;
 use std::path::Path;
 use tyndall_formats::volume::{Endian, RawLayout, SampleType, read, read_raw};
+use tyndall_testing::within_limits;
 
 fn gzip(data: &[u8]) -> Vec<u8> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
@@ -169,5 +170,56 @@ fn a_raw_file_of_any_length_is_refused_unless_it_suffices() {
     for length in 0..60 {
         std::fs::write(&path, vec![1; length]).unwrap();
         assert_eq!(read_raw(&path, &layout).is_ok(), length >= 51, "{length} bytes");
+    }
+}
+
+/// NRRD whose samples are what is given, in that encoding, of that size.
+fn packed(encoding: &str, sizes: &str, data: &[u8]) -> Vec<u8> {
+    let head = format!("NRRD0004\ntype: uchar\ndimension: 3\nsizes: {sizes}\nencoding: {encoding}\n\n");
+    [head.as_bytes(), data].concat()
+}
+
+/// What asks for little of a stream that unpacks to much gets little; what asks for more than a stream can hold is
+/// refused before it is unpacked.
+#[test]
+fn a_packed_gibibyte_costs_no_more_than_is_asked_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.nrrd");
+    let zeros = vec![0; 1 << 26];
+    for (encoding, data) in [("gzip", gzip(&zeros)), ("bzip2", bzip2(&zeros))] {
+        let many = data.repeat(16);
+        std::fs::write(&path, packed(encoding, "8 1 1", &many)).unwrap();
+        assert_eq!(within_limits(|| read(&path)).unwrap().volume.grid().dims(), [8, 1, 1], "{encoding}");
+        std::fs::write(&path, packed(encoding, "16777216 16777216 1", &many)).unwrap();
+        let error = within_limits(|| read(&path)).unwrap_err().to_string();
+        assert!(error.contains("cannot hold") || error.contains("bytes of memory"), "{error}");
+    }
+    // A gibibyte, of which the stream holds a sixteenth.
+    std::fs::write(&path, packed("gzip", "1024 1024 1024", &gzip(&zeros))).unwrap();
+    let error = within_limits(|| read(&path)).unwrap_err().to_string();
+    assert!(error.contains("cannot hold"), "{error}");
+}
+
+#[test]
+fn a_header_of_many_lines_is_read_in_one_go() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.nrrd");
+    let head = format!("NRRD0004\n{}data file: a.raw\n", "a:\n".repeat(300_000));
+    std::fs::write(&path, head).unwrap();
+    let error = within_limits(|| read(&path)).unwrap_err();
+    assert!(error.to_string().contains("sizes") || error.to_string().contains("dimension"), "{error}");
+}
+
+#[test]
+fn names_of_slices_are_counted_before_they_are_made() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.nhdr");
+    for range in ["0 16777215 1", "0 -9223372036854775808 -1"] {
+        let head = format!(
+            "NRRD0004\ntype: uchar\ndimension: 2\nsizes: 1 16777216\nencoding: raw\ndata file: %d.raw {range}\n"
+        );
+        std::fs::write(&path, head).unwrap();
+        let error = within_limits(|| read(&path)).unwrap_err().to_string();
+        assert!(error.contains("data file: found `%d.raw 0"), "{error}");
     }
 }

@@ -185,3 +185,18 @@ fn other_kinds_and_places_are_refused() {
     assert!(read_map(&folder.join("a.hdr")).unwrap_err().to_string().contains("name a file inside it"));
     assert!(matches!(read_map(&folder.join("b.exr")), Err(ImageError::Unreadable { .. })));
 }
+
+/// A file of 60 KiB whose header asks for tiles of 64 x 16777280 took 2 GiB.
+#[test]
+fn tiles_larger_than_the_picture_are_refused() {
+    let path = folder("map_tiles").join("a.exr");
+    write_exr_in(&path, Encoding::FAST_LOSSLESS, &[("R", [1.0; 4]), ("G", [1.0; 4]), ("B", [1.0; 4])]);
+    let mut bytes = fs::read(&path).unwrap();
+    let name = b"tiledesc\0\x09\0\0\0";
+    let place = bytes.windows(name.len()).position(|part| part == name).expect("tiles") + name.len();
+    assert!(read_map(&path).is_ok());
+    bytes[place + 7] = 1;
+    rewrite(&path, &bytes);
+    let message = read_map(&path).unwrap_err().to_string();
+    assert!(message.contains("tiles of 64 x 16777280 for 2 x 2 pixels"), "{message}");
+}

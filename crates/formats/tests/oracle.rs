@@ -60,8 +60,9 @@ fn difference(root: &Path, path: &Path, expected: &Expected) -> Result<(), Strin
     if values.len() != grid.len() {
         return Err(format!("{} values dumped, expected {}", values.len(), grid.len()));
     }
+    let voxels = volume.voxels();
     for (index, expected) in values.enumerate() {
-        let found = volume.value_map().apply(volume.voxels().get(index));
+        let found = volume.value_map().apply(voxels.get(index));
         if (found - expected).abs() > VALUE_TOLERANCE * expected.abs() {
             return Err(format!("value {index} is {found}, expected {expected}"));
         }

@@ -1,11 +1,13 @@
 //! A session: a scene, its integrator and the film, refined slice by slice.
 
 use crate::film::{Film, Image};
-use crate::integrator::Integrator;
+use crate::integrator::{Integrator, Pending, Stop};
 use crate::scene::{IntegratorKind, Scene};
+use crate::simd::Level;
 use rayon::prelude::*;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Instant;
 
 /// When a slice of work ends; the first limit met counts.
@@ -13,7 +15,7 @@ use std::time::Instant;
 pub struct Budget {
     /// Samples that every pixel shall have in the end.
     pub samples: u32,
-    /// Point in time after which no tile is begun.
+    /// Point in time at which to stop; pixels that have had their turn then have a sample more than others.
     pub deadline: Option<Instant>,
     /// Raised from elsewhere to stop soon.
     pub cancel: Arc<AtomicBool>,
@@ -24,10 +26,6 @@ impl Budget {
     #[must_use]
     pub fn samples(samples: u32) -> Self {
         Self { samples, deadline: None, cancel: Arc::default() }
-    }
-
-    fn is_spent(&self) -> bool {
-        self.cancel.load(Ordering::Relaxed) || self.deadline.is_some_and(|end| Instant::now() >= end)
     }
 }
 
@@ -45,6 +43,8 @@ pub struct Session {
     scene: Scene,
     integrator: Integrator,
     film: Film,
+    /// What a stop left half done, per tile.
+    pending: Vec<Pending>,
     threads: Arc<rayon::ThreadPool>,
 }
 
@@ -52,8 +52,16 @@ impl Session {
     /// Prepares a scene; `threads` is shared with whoever made the scene, never the global pool.
     #[must_use]
     pub fn new(scene: Scene, threads: Arc<rayon::ThreadPool>) -> Self {
-        let integrator = threads.install(|| Integrator::new(&scene));
-        Self { integrator, film: Film::new(scene.size), scene, threads }
+        Self::with_level(scene, threads, Level::best())
+    }
+
+    /// [`Self::new`] with certain vector instructions instead of the widest.
+    #[must_use]
+    pub fn with_level(scene: Scene, threads: Arc<rayon::ThreadPool>, level: Level) -> Self {
+        let integrator = threads.install(|| Integrator::new(&scene, level));
+        let mut film = Film::new(scene.size);
+        let pending = vec![Pending::default(); film.tiles_mut().len()];
+        Self { integrator, film, pending, scene, threads }
     }
 
     /// What is rendered.
@@ -78,19 +86,39 @@ impl Session {
     /// as early as can be. Every sample follows from its pixel and number, so threads and slices leave
     /// no trace in the bits.
     pub fn refine(&mut self, budget: &Budget) -> Progress {
+        let stop = Stop::when(budget.cancel.clone());
+        std::thread::scope(|scope| {
+            let (done, watched) = mpsc::channel::<()>();
+            if let Some(deadline) = budget.deadline {
+                let stop = stop.clone();
+                scope.spawn(move || {
+                    let left = deadline.saturating_duration_since(Instant::now());
+                    if watched.recv_timeout(left) == Err(RecvTimeoutError::Timeout) {
+                        stop.expire();
+                    }
+                });
+            }
+            self.refine_until(budget.samples, &stop);
+            drop(done);
+        });
+        self.progress()
+    }
+
+    fn refine_until(&mut self, samples: u32, stop: &Stop) {
         let (scene, integrator) = (&self.scene, &self.integrator);
-        while self.film.samples() < budget.samples && !budget.is_spent() {
-            let pass = self.film.samples() + 1;
-            let tiles = self.film.tiles_mut();
+        while self.film.samples() < samples && !stop.reached() {
+            // Several passes at once, as soon as that delays no picture much, spare threads the waiting for each other.
+            let so_far = self.film.samples();
+            let pass = so_far.saturating_add((so_far / 4).clamp(1, 16)).min(samples);
+            let tiles = self.film.tiles_mut().par_iter_mut().zip(&mut self.pending).with_max_len(1);
             self.threads.install(|| {
-                tiles.par_iter_mut().with_max_len(1).for_each(|tile| {
-                    if tile.samples() < pass && !budget.is_spent() {
-                        tile.add_pass(|pixel, n| integrator.sample(scene, pixel, n));
+                tiles.for_each(|(tile, pending)| {
+                    if !stop.reached() {
+                        integrator.refine(scene, tile, pending, pass, stop);
                     }
                 });
             });
         }
-        self.progress()
     }
 
     /// How far it is.

@@ -18,6 +18,10 @@ pub struct Ended {
     pub status: Option<i32>,
     pub stdout: Vec<u8>,
     pub stderr: String,
+    /// How long it ran.
+    pub took: Duration,
+    /// The most memory that was seen resident, in bytes; 0 where the system does not tell.
+    pub memory: u64,
 }
 
 impl Folder {
@@ -53,7 +57,10 @@ impl Folder {
         command.stdout(File::create(&stdout).expect("a file")).stderr(File::create(&stderr).expect("a file"));
         let mut child = command.spawn().expect("the program starts");
         let begun = Instant::now();
+        let mut memory = 0;
         let status = loop {
+            // A peak is missed only if the program ends within two milliseconds of it.
+            memory = memory.max(peak_memory(child.id()));
             if let Some(status) = child.try_wait().expect("a status") {
                 break status.code();
             }
@@ -63,7 +70,16 @@ impl Folder {
             }
             std::thread::sleep(Duration::from_millis(2));
         };
+        let took = begun.elapsed();
         let text = |path: &Path| fs::read(path).expect("a file");
-        Ended { status, stdout: text(&stdout), stderr: String::from_utf8_lossy(&text(&stderr)).into_owned() }
+        let stderr = String::from_utf8_lossy(&text(&stderr)).into_owned();
+        Ended { status, stdout: text(&stdout), stderr, took, memory }
     }
+}
+
+/// The largest resident memory of a running process so far; 0 where the system does not tell.
+fn peak_memory(process: u32) -> u64 {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok()).unwrap_or(0) << 10
 }

@@ -2,12 +2,14 @@
 
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
+use tyndall::light::BRIGHTEST;
+use tyndall::message::{excerpt, place, sentence};
 
 /// A picture or map that could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The file's name does not tell a known kind.
-    #[error("{}: {found}; give it one of {known}", path.display())]
+    #[error("{}: {found}; give it one of {known}", place(path))]
     Extension {
         /// The file.
         path: PathBuf,
@@ -17,7 +19,7 @@ pub enum ImageError {
         known: &'static str,
     },
     /// The disk does not take the file.
-    #[error("{}: cannot write the picture: {source}; {mend}", path.display())]
+    #[error("{}: cannot write the picture: {source}; {mend}", place(path))]
     Unwritable {
         /// The file.
         path: PathBuf,
@@ -27,7 +29,7 @@ pub enum ImageError {
         mend: String,
     },
     /// The disk does not give the file.
-    #[error("{}: cannot read the picture: {source}; {mend}", path.display())]
+    #[error("{}: cannot read the picture: {source}; {mend}", place(path))]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -37,7 +39,7 @@ pub enum ImageError {
         mend: String,
     },
     /// The picture has more pixels than the kind of file, or this program, can hold.
-    #[error("{}: {width} x {height} pixels, expected at most {limit}; {mend}", path.display())]
+    #[error("{}: {width} x {height} pixels, expected at most {limit}; {mend}", place(path))]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -51,7 +53,7 @@ pub enum ImageError {
         mend: &'static str,
     },
     /// The file's library refused the picture.
-    #[error("{}: cannot encode the picture: {reason}; try another kind of file", path.display())]
+    #[error("{}: cannot encode the picture: {}; try another kind of file", place(path), sentence(reason))]
     Encode {
         /// The file.
         path: PathBuf,
@@ -59,7 +61,7 @@ pub enum ImageError {
         reason: String,
     },
     /// The file's content is damaged, or of a variant that is not read.
-    #[error("{}: not a readable {kind} file: {reason}; copy or save it again", path.display())]
+    #[error("{}: not a readable {kind} file: {}; copy or save it again", place(path), sentence(reason))]
     Malformed {
         /// The file.
         path: PathBuf,
@@ -69,13 +71,19 @@ pub enum ImageError {
         reason: String,
     },
     /// The file is not one of the kinds that carry metadata.
-    #[error("{}: found no picture, expected PNG, JPEG, TIFF or OpenEXR content; name a picture that Tyndall wrote", path.display())]
+    #[error(
+        "{}: found no picture, expected PNG, JPEG, TIFF or OpenEXR content; name a picture that Tyndall wrote",
+        place(path)
+    )]
     NotAPicture {
         /// The file.
         path: PathBuf,
     },
     /// A texel of a map is not a radiance.
-    #[error("{}: texel ({x}, {y}) is {value:?}, expected finite values of at least 0; repair it in the map", path.display())]
+    #[error(
+        "{}: texel ({x}, {y}) is {value:?}, expected values from 0 to {BRIGHTEST:e}; repair it in the map",
+        place(path)
+    )]
     Texel {
         /// The file.
         path: PathBuf,
@@ -91,7 +99,7 @@ pub enum ImageError {
 impl ImageError {
     pub(super) fn extension(path: &Path, known: &'static str) -> Self {
         let found = match path.extension() {
-            Some(extension) => format!("unknown kind `.{}`", extension.to_string_lossy()),
+            Some(extension) => format!("unknown kind `.{}`", excerpt(&extension.to_string_lossy())),
             None => "no extension".to_owned(),
         };
         Self::Extension { path: path.to_owned(), found, known }
@@ -100,8 +108,8 @@ impl ImageError {
     pub(super) fn unwritable(path: &Path, source: Error) -> Self {
         let folder = crate::atomic::folder_of(path);
         let mend = match source.kind() {
-            ErrorKind::NotFound => format!("create the folder {} first", folder.display()),
-            ErrorKind::NotADirectory => format!("choose another place: {} is no folder", folder.display()),
+            ErrorKind::NotFound => format!("create the folder {} first", place(folder)),
+            ErrorKind::NotADirectory => format!("choose another place: {} is no folder", place(folder)),
             ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
                 "choose a file and folder that you may write to".to_owned()
             }

@@ -8,6 +8,7 @@ use std::io::{BufRead, Cursor, Seek};
 use exr::image::write::WritableImage;
 use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image};
 use exr::math::Vec2;
+use exr::meta::BlockDescription;
 use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, ChannelList, Compression, LineOrder, Text};
 use exr::meta::header::Header;
@@ -147,6 +148,9 @@ fn rgb_names(channels: &ChannelList) -> Option<[Text; 3]> {
     })
 }
 
+/// Pixels of a tile that are taken for granted.
+const LARGEST_TILE: u64 = 1 << 20;
+
 fn check_size(header: &Header, length: u64) -> Result<(), MapFailure> {
     let [width, height] = [header.layer_size.width() as u64, header.layer_size.height() as u64];
     Map::check_size(width, height)?;
@@ -155,6 +159,14 @@ fn check_size(header: &Header, length: u64) -> Result<(), MapFailure> {
         _ => SHRINKS_LOSSLESS,
     };
     let bytes = (width * height).saturating_mul(header.channels.bytes_per_pixel as u64);
+    // Memory is taken for whole tiles, even where the picture is smaller.
+    if let BlockDescription::Tiles(tiles) = header.blocks {
+        let [across, down] = [tiles.tile_size.width() as u64, tiles.tile_size.height() as u64];
+        if across.saturating_mul(down) > LARGEST_TILE.max(width * height) {
+            let found = format!("found tiles of {across} x {down} for {width} x {height} pixels");
+            return Err(MapFailure::Malformed(format!("{found}, expected tiles within the picture")));
+        }
+    }
     if bytes / shrinks > length {
         let found = format!("{length} bytes for {width} x {height} pixels");
         return Err(MapFailure::Malformed(format!(

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use tyndall::light::BRIGHTEST;
 use tyndall::math::Rgb;
 
 use super::error::ImageError;
@@ -14,7 +15,7 @@ pub struct Map {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Every texel; finite, no channel below 0.
+    /// Every texel; each channel from 0 to [`BRIGHTEST`].
     pub pixels: Vec<Rgb>,
 }
 
@@ -48,7 +49,7 @@ pub(super) enum MapFailure {
 /// # Errors
 /// [`ImageError::Extension`] for another kind, [`ImageError::Unreadable`] if the disk refuses,
 /// [`ImageError::Malformed`] for a damaged file, [`ImageError::TooLarge`] beyond 2^28 texels,
-/// [`ImageError::Texel`] for one that is negative, infinite or undefined.
+/// [`ImageError::Texel`] for one that is negative, undefined or beyond [`BRIGHTEST`].
 pub fn read_map(path: &Path) -> Result<Map, ImageError> {
     let extension = lower_extension(path);
     let kind = match extension.as_str() {
@@ -69,7 +70,7 @@ pub fn read_map(path: &Path) -> Result<Map, ImageError> {
             mend: "scale the map down",
         },
     })?;
-    let fits = |x: f32| x.is_finite() && x >= 0.0;
+    let fits = |x: f32| (0.0..=BRIGHTEST).contains(&x);
     match map.pixels.iter().position(|p| !p.to_array().into_iter().all(fits)) {
         Some(bad) => Err(ImageError::Texel {
             path: path.to_owned(),

@@ -1,12 +1,11 @@
 //! TIFF: 8 bits, sRGB, deflated; opacity straight where the picture is transparent; metadata as JSON in ImageDescription.
 
-use std::io::{BufRead, Cursor, Seek};
+use std::io::{BufRead, Cursor, ErrorKind, Read, Seek, SeekFrom};
 
 use tiff::TiffError;
-use tiff::decoder::{Decoder, Limits};
 use tiff::encoder::colortype::RGB8;
 use tiff::encoder::{Compression, DeflateLevel, TiffEncoder};
-use tiff::tags::{ExtraSamples, Tag};
+use tiff::tags::{ExtraSamples, Tag, Type};
 
 use super::error::EncodeFailure;
 use super::{Display, Metadata, Picture, display};
@@ -39,13 +38,65 @@ fn try_encode(picture: &Picture, display: &Display, metadata: &Metadata) -> Resu
     Ok(file.into_inner())
 }
 
-pub(super) fn read_metadata(file: impl BufRead + Seek, length: u64) -> Result<Metadata, String> {
-    let mut limits = Limits::default();
-    limits.ifd_value_size = usize::try_from(length.min(TEXT_LIMIT)).unwrap_or(usize::MAX);
-    let mut decoder = Decoder::new(file).map_err(|error| error.to_string())?.with_limits(limits);
-    let description = decoder.find_tag(Tag::ImageDescription).map_err(|error| error.to_string())?;
-    // A description that is not our JSON is another program's.
-    let ours =
-        description.and_then(|value| value.into_string().ok()).and_then(|text| Metadata::from_json(&text));
-    Ok(ours.unwrap_or_default())
+/// The text of the first directory's ImageDescription.
+///
+/// Of a damaged file the library would print to standard error and take memory that the file does not hold, so the
+/// few fields on the way are read here. Tyndall writes no BigTIFF.
+pub(super) fn read_metadata(mut file: impl BufRead + Seek, length: u64) -> Result<Metadata, String> {
+    let mut order = [0; 4];
+    file.read_exact(&mut order).map_err(ends)?;
+    let mut fields = Fields { file, little: order[0] == b'I' };
+    if (if fields.little { order[2] } else { order[3] }) == 43 {
+        return Ok(Metadata::default());
+    }
+    let directory = fields.u32()?;
+    fields.file.seek(SeekFrom::Start(directory.into())).map_err(ends)?;
+    for _ in 0..fields.u16()? {
+        let [tag, kind] = [fields.u16()?, fields.u16()?];
+        let [count, place] = [fields.u32()?, fields.u32()?];
+        // Four bytes or fewer would stand in the place of `place`, and are none of ours.
+        if tag != Tag::ImageDescription.to_u16() || kind != Type::ASCII.to_u16() || count <= 4 {
+            continue;
+        }
+        if u64::from(place) + u64::from(count) > length || u64::from(count) > TEXT_LIMIT {
+            return Err(format!(
+                "found a description of {count} bytes at {place}, expected it within the file"
+            ));
+        }
+        fields.file.seek(SeekFrom::Start(place.into())).map_err(ends)?;
+        let mut text = vec![0; count as usize];
+        fields.file.read_exact(&mut text).map_err(ends)?;
+        let text = text.split(|&b| b == 0).next().unwrap_or_default();
+        // A description that is not our JSON is another program's.
+        return Ok(std::str::from_utf8(text).ok().and_then(Metadata::from_json).unwrap_or_default());
+    }
+    Ok(Metadata::default())
+}
+
+/// Numbers one after the other, in the file's byte order.
+struct Fields<F> {
+    file: F,
+    little: bool,
+}
+
+impl<F: Read> Fields<F> {
+    fn u16(&mut self) -> Result<u16, String> {
+        let mut bytes = [0; 2];
+        self.file.read_exact(&mut bytes).map_err(ends)?;
+        Ok(if self.little { u16::from_le_bytes(bytes) } else { u16::from_be_bytes(bytes) })
+    }
+
+    fn u32(&mut self) -> Result<u32, String> {
+        let mut bytes = [0; 4];
+        self.file.read_exact(&mut bytes).map_err(ends)?;
+        Ok(if self.little { u32::from_le_bytes(bytes) } else { u32::from_be_bytes(bytes) })
+    }
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "as `map_err` hands it over")]
+fn ends(error: std::io::Error) -> String {
+    match error.kind() {
+        ErrorKind::UnexpectedEof => "the file ends inside its directory".to_owned(),
+        _ => error.to_string(),
+    }
 }

@@ -2,6 +2,7 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
+use tyndall::message::{excerpt, place, sentence};
 use tyndall::volume::{GridError, VolumeError};
 
 /// The kinds that [`super::read`] knows, for messages.
@@ -13,7 +14,7 @@ pub(super) const KINDS: &str =
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The operating system refused.
-    #[error("{}: cannot be read: {source}", .path.display())]
+    #[error("{}: cannot be read: {source}", place(.path))]
     Io {
         /// The file.
         path: PathBuf,
@@ -21,7 +22,7 @@ pub enum ReadError {
         source: io::Error,
     },
     /// A folder, a pipe or a device.
-    #[error("{}: {found}, expected a regular file", .path.display())]
+    #[error("{}: {found}, expected a regular file", place(.path))]
     NotAFile {
         /// What was asked for.
         path: PathBuf,
@@ -29,19 +30,19 @@ pub enum ReadError {
         found: &'static str,
     },
     /// No byte in it.
-    #[error("{}: the file is empty, expected a volume", .path.display())]
+    #[error("{}: the file is empty, expected a volume", place(.path))]
     Empty {
         /// The file.
         path: PathBuf,
     },
     /// Neither the first bytes nor the extension tell a kind.
-    #[error("{}: no kind of volume that is known here; known are {KINDS}; for raw samples state their layout", .path.display())]
+    #[error("{}: no kind of volume that is known here; known are {KINDS}; for raw samples state their layout", place(.path))]
     UnknownKind {
         /// The file.
         path: PathBuf,
     },
     /// A header says something that cannot be.
-    #[error("{}: {key}: found {found}, expected {expected}", .path.display())]
+    #[error("{}: {key}: found {found}, expected {expected}", place(.path))]
     Header {
         /// The file.
         path: PathBuf,
@@ -53,7 +54,7 @@ pub enum ReadError {
         expected: String,
     },
     /// A valid file of a sort that is not read here.
-    #[error("{}: {what} is not supported; {mend}", .path.display())]
+    #[error("{}: {} is not supported; {mend}", place(.path), sentence(.what))]
     Unsupported {
         /// The file.
         path: PathBuf,
@@ -63,7 +64,7 @@ pub enum ReadError {
         mend: String,
     },
     /// Fewer samples than the header asks for.
-    #[error("{}: {found} bytes of samples, expected {expected} by the header; the file is cut short or its header is wrong", .path.display())]
+    #[error("{}: {found} bytes of samples, expected {expected} by the header; the file is cut short or its header is wrong", place(.path))]
     Short {
         /// The file that holds the samples.
         path: PathBuf,
@@ -73,7 +74,7 @@ pub enum ReadError {
         expected: u64,
     },
     /// The compressed stream or the text of the samples is damaged.
-    #[error("{}: the samples are damaged: {message}", .path.display())]
+    #[error("{}: the samples are damaged: {}", place(.path), sentence(.message))]
     Damaged {
         /// The file that holds the samples.
         path: PathBuf,
@@ -81,7 +82,7 @@ pub enum ReadError {
         message: String,
     },
     /// The samples would not fit.
-    #[error("{}: needs {needed} bytes of memory, but {available} are available; crop or downsample it", .path.display())]
+    #[error("{}: needs {needed} bytes of memory, but {available} are available; crop or downsample it", place(.path))]
     Memory {
         /// The file.
         path: PathBuf,
@@ -91,7 +92,7 @@ pub enum ReadError {
         available: u64,
     },
     /// The file that a header names cannot be read.
-    #[error("{}: its data file: {source}", .path.display())]
+    #[error("{}: its data file: {source}", place(.path))]
     DataFile {
         /// The header's file.
         path: PathBuf,
@@ -99,7 +100,7 @@ pub enum ReadError {
         source: Box<ReadError>,
     },
     /// The data values are too large to be rendered.
-    #[error("{}: values from {:e} to {:e}, expected at most {:e} in size; rescale them", .path.display(), .range[0], .range[1], f32::MAX)]
+    #[error("{}: values from {:e} to {:e}, expected at most {:e} in size; rescale them", place(.path), .range[0], .range[1], f32::MAX)]
     Values {
         /// The file.
         path: PathBuf,
@@ -107,7 +108,7 @@ pub enum ReadError {
         range: [f64; 2],
     },
     /// The header's geometry cannot be.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {source}", place(.path))]
     Grid {
         /// The file.
         path: PathBuf,
@@ -115,7 +116,7 @@ pub enum ReadError {
         source: GridError,
     },
     /// Samples and grid make no volume.
-    #[error("{}: {source}", .path.display())]
+    #[error("{}: {source}", place(.path))]
     Volume {
         /// The file.
         path: PathBuf,
@@ -127,7 +128,12 @@ pub enum ReadError {
 impl ReadError {
     /// A header's entry that cannot be; quotes what was found.
     pub(super) fn header(path: &Path, key: &str, found: &str, expected: &str) -> Self {
-        Self::Header { path: path.into(), key: key.into(), found: excerpt(found), expected: expected.into() }
+        Self::Header {
+            path: path.into(),
+            key: key.into(),
+            found: format!("`{}`", excerpt(found)),
+            expected: expected.into(),
+        }
     }
 
     /// A header's entry that is not there.
@@ -154,13 +160,4 @@ impl ReadError {
     pub(super) fn in_data_file(self, header: &Path) -> Self {
         Self::DataFile { path: header.into(), source: Box::new(self) }
     }
-}
-
-/// At most 60 characters of what a file says, quoted and without control characters.
-pub(super) fn excerpt(text: &str) -> String {
-    let mut short: String = text.chars().take(60).flat_map(char::escape_debug).collect();
-    if text.chars().nth(60).is_some() {
-        short.push_str("...");
-    }
-    format!("`{short}`")
 }

@@ -50,6 +50,11 @@ impl<'a> Fields<'a> {
         Self { path, entries: Vec::new() }
     }
 
+    /// Whether two keys are one.
+    pub fn same(key: &str, other: &str) -> bool {
+        plain(key) == plain(other)
+    }
+
     pub fn insert(&mut self, key: &str, value: &str) {
         self.entries.push((plain(key), value.trim().to_string()));
     }
@@ -103,6 +108,9 @@ fn plain(key: &str) -> String {
     key.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_lowercase).collect()
 }
 
+/// More slices than any scanner makes; a header that asks for more would take memory for their names alone.
+const MOST_FILES: usize = 1 << 16;
+
 /// The files that a header names by a pattern such as `slice%03d.raw`, for `first`, `first + step` ... `last`.
 ///
 /// # Errors
@@ -122,7 +130,9 @@ pub(super) fn numbered_files(
     let after = rest.strip_prefix(['d', 'i', 'u']).ok_or_else(|| wrong("a number as %d or %03d"))?;
     let width: usize = if digits.is_empty() { 0 } else { digits.parse().unwrap_or(usize::MAX) };
     let span = last.checked_sub(first).filter(|span| step != 0 && span.signum() * step.signum() >= 0);
-    let count = span.and_then(|span| usize::try_from(span / step).ok()).filter(|&n| n < most && width <= 20);
+    let most = most.min(MOST_FILES);
+    let count = span.and_then(|span| usize::try_from(span.checked_div(step)?).ok());
+    let count = count.filter(|&n| n < most && width <= 20);
     let count = count.ok_or_else(|| wrong(&format!("numbers that give 1 to {most} files")))?;
     let name = |n: usize| {
         let number = first + step * i64::try_from(n).unwrap_or(0);
@@ -150,12 +160,19 @@ mod tests {
             ("%s", [1, 2, 1]),
             ("%d", [1, 2, 0]),
             ("%d", [i64::MIN, i64::MAX, 1]),
+            ("%d", [0, i64::MIN, -1]),
             ("%99999999999999999999d", [1, 2, 1]),
             ("%d", [1, 2, -1]),
             ("%d", [1, 10, 1]),
         ] {
             assert!(names(pattern, range).is_err(), "{pattern} {range:?}");
         }
+    }
+
+    #[test]
+    fn names_are_never_more_than_files() {
+        let names = numbered_files(Path::new("test"), "data file", "%d", [1, 1 << 40, 1], usize::MAX);
+        assert!(names.unwrap_err().to_string().contains("65536 files"));
     }
 
     #[test]

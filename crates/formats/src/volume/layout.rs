@@ -1,6 +1,6 @@
 //! From a stream of bytes to typed samples: which axes the file has, and which of them are kept.
 
-use super::error::{ReadError, excerpt};
+use super::error::ReadError;
 use super::sample_type::{Endian, SampleType};
 use super::stream::{Every, Stream, fill};
 use crate::memory::available;
@@ -8,7 +8,8 @@ use bytemuck::Pod;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 use std::str::FromStr;
-use tyndall::volume::Voxels;
+use tyndall::message::excerpt;
+use tyndall::volume::{Bricks, Voxels};
 
 /// # Errors
 /// [`ReadError::Memory`] if so many bytes more cannot be had.
@@ -73,6 +74,16 @@ impl Layout {
         self.samples() as u64 * self.sample.size() as u64
     }
 
+    /// Bytes that the volume takes while it is loaded: in the file's order and in bricks, at once.
+    fn memory(&self) -> u64 {
+        let mut lengths = self.axes.iter().filter(|(_, axis)| *axis == Axis::Space).map(|(n, _)| *n);
+        let mut dims = [1; 3].map(|one| lengths.next().unwrap_or(one));
+        // More than three axes of space are refused elsewhere; here they only must not be forgotten.
+        dims[2] = dims[2].saturating_mul(lengths.product());
+        let bricks = Bricks::bytes(dims, self.sample.size()).unwrap_or(u64::MAX);
+        (self.count(Axis::Space) as u64 * self.sample.size() as u64).saturating_add(bricks)
+    }
+
     fn samples(&self) -> usize {
         self.axes.iter().map(|(n, _)| n).product()
     }
@@ -86,8 +97,7 @@ impl Layout {
         {
             return Err(ReadError::Short { path: path.into(), found, expected: self.bytes() });
         }
-        let needed = self.count(Axis::Space) as u64 * self.sample.size() as u64;
-        check_memory(path, needed)?;
+        check_memory(path, self.memory())?;
         if self.text {
             self.read_text(path, reader)
         } else {
@@ -140,7 +150,7 @@ impl Layout {
             let value = word.parse().map_err(|_| ReadError::Damaged {
                 path: path.into(),
                 message: format!(
-                    "sample {index}: found {}, expected a {} number",
+                    "sample {index}: found `{}`, expected a {} number",
                     excerpt(&word),
                     self.sample.name()
                 ),

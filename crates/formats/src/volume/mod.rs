@@ -137,7 +137,7 @@ mod tests {
         let nrrd = b"NRRD0004\ntype: uchar\ndimension: 1\nsizes: 2\nencoding: raw\n\n\x01\x02";
         for name in ["a.nii.gz", "a.mha", "a", "a.npy", "a.raw"] {
             let (_folder, path) = folder_with(name, nrrd);
-            assert_eq!(read(&path).unwrap().volume.voxels(), &Voxels::U8(vec![1, 2]), "{name}");
+            assert_eq!(read(&path).unwrap().volume.voxels(), Voxels::U8(vec![1, 2]), "{name}");
         }
     }
 

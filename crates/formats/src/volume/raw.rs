@@ -69,7 +69,7 @@ mod tests {
         bytes.extend([-1_i16, 2, 300, -400, 5, 6].iter().flat_map(|v| v.to_be_bytes()));
         let (_folder, path) = folder_with("a.raw", &bytes);
         let loaded = read_raw(&path, &layout()).unwrap();
-        assert_eq!(*loaded.volume.voxels(), Voxels::I16(vec![-1, 2, 300, -400, 5, 6]));
+        assert_eq!(loaded.volume.voxels(), Voxels::I16(vec![-1, 2, 300, -400, 5, 6]));
         assert_eq!(loaded.volume.grid().origin(), [-1.0, -1.0, 0.0]);
         let told = RawLayout { origin: Some([1.0, 2.0, 3.0]), ..layout() };
         assert_eq!(read_raw(&path, &told).unwrap().volume.grid().origin(), [1.0, 2.0, 3.0]);

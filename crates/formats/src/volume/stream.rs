@@ -20,6 +20,19 @@ pub(super) enum Coding {
     Zlib,
 }
 
+impl Coding {
+    /// No file becomes so many times longer: a header that asks for more lies, and is told so before the work.
+    fn largest_factor(self) -> u64 {
+        match self {
+            Self::Raw => 1,
+            // Two bits for 258 bytes, and blocks begin with a few.
+            Self::Gzip | Self::Zlib => 1100,
+            // A block of 900,000 bytes, each five of which repeat one byte 259 times, in some 40 bytes.
+            Self::Bzip2 => 2_000_000,
+        }
+    }
+}
+
 /// Where in a file the samples begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Start {
@@ -74,6 +87,11 @@ pub(super) fn samples(
 ) -> Result<Stream<'static>, ReadError> {
     let trouble = |source| ReadError::io(path, source);
     if coding != Coding::Raw {
+        let length = file.get_ref().metadata().map_err(trouble)?.len();
+        if needed / coding.largest_factor() > length {
+            let message = format!("{length} bytes cannot hold {needed} bytes of samples, expected more");
+            return Err(ReadError::Damaged { path: path.into(), message });
+        }
         let mut reader = decode(file, coding).map_err(trouble)?;
         let Start::After(bytes) = start else {
             let mend = "state the number of bytes to skip, or store the samples uncompressed";

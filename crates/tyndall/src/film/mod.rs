@@ -6,6 +6,7 @@
 pub mod tone;
 
 use crate::math::{Rgb, cast};
+use std::sync::Arc;
 
 /// What one sample of a pixel found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,14 +59,20 @@ fn luminance_of([r, g, b]: [f64; 3]) -> f64 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
-/// A square of pixels and how many samples each of them has.
+/// A square of pixels that take their samples in turn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
     origin: [u32; 2],
-    size: [u32; 2],
+    /// Where each pixel lies in the tile: block by block of 4 x 4, so that pixels that follow each other are near.
+    order: Arc<[[u32; 2]]>,
     samples: u32,
+    /// Pixels that have one sample more.
+    ahead: usize,
     pixels: Vec<Pixel>,
 }
+
+/// Edge of the blocks in which a tile's pixels are ordered.
+const BLOCK: u32 = 4;
 
 impl Tile {
     /// Samples that every pixel of the tile has.
@@ -74,16 +81,34 @@ impl Tile {
         self.samples
     }
 
-    /// Adds one sample to every pixel; `sample` is given the pixel and the number of the sample.
-    pub fn add_pass(&mut self, mut sample: impl FnMut([u32; 2], u32) -> PixelSample) {
-        let n = f64::from(self.samples) + 1.0;
-        let [width, _] = self.size;
-        for (i, pixel) in (0_u32..).zip(&mut self.pixels) {
-            let place = [self.origin[0] + i % width, self.origin[1] + i / width];
-            pixel.add(&sample(place, self.samples), n);
-        }
-        self.samples += 1;
+    /// The pixels that are next to take a sample, all with the same number, which comes second; at most `most`.
+    pub fn next(&self, most: usize) -> (impl ExactSizeIterator<Item = [u32; 2]>, u32) {
+        let last = self.order.len().min(self.ahead + most);
+        let [x, y] = self.origin;
+        (self.order[self.ahead..last].iter().map(move |place| [x + place[0], y + place[1]]), self.samples)
     }
+
+    /// Adds the sample of the pixel whose turn it is.
+    pub fn add(&mut self, sample: &PixelSample) {
+        self.pixels[self.ahead].add(sample, f64::from(self.samples) + 1.0);
+        self.ahead += 1;
+        if self.ahead == self.pixels.len() {
+            self.samples += 1;
+            self.ahead = 0;
+        }
+    }
+
+    /// Samples of the `i`-th pixel.
+    fn samples_of(&self, i: usize) -> f64 {
+        f64::from(self.samples) + f64::from(i < self.ahead)
+    }
+}
+
+/// The order of a tile's pixels.
+fn order([width, height]: [u32; 2]) -> Arc<[[u32; 2]]> {
+    let mut places: Vec<_> = (0..width * height).map(|i| [i % width, i / width]).collect();
+    places.sort_by_key(|&[x, y]| (y / BLOCK, x / BLOCK, y, x));
+    places.into()
 }
 
 /// A picture in the making.
@@ -111,11 +136,13 @@ impl Film {
     #[must_use]
     pub fn new(size: [u32; 2]) -> Self {
         let [columns, rows] = size.map(|n| n.div_ceil(TILE));
+        let whole = order([TILE; 2]);
         let tile = |i: u32| {
             let origin = [i % columns * TILE, i / columns * TILE];
             let size = [0, 1].map(|a| TILE.min(size[a] - origin[a]));
-            let pixels = vec![Pixel::default(); (size[0] * size[1]) as usize];
-            Tile { origin, size, samples: 0, pixels }
+            let order = if size == [TILE; 2] { whole.clone() } else { order(size) };
+            let pixels = vec![Pixel::default(); order.len()];
+            Tile { origin, order, samples: 0, ahead: 0, pixels }
         };
         Self { size, tiles: (0..columns * rows).map(tile).collect() }
     }
@@ -146,16 +173,16 @@ impl Film {
     /// Samples per pixel, averaged over the picture.
     #[must_use]
     pub fn mean_samples(&self) -> f64 {
-        let taken: f64 = self.tiles.iter().map(|t| f64::from(t.samples) * t.pixels.len() as f64).sum();
+        let taken = |t: &Tile| f64::from(t.samples) * t.pixels.len() as f64 + t.ahead as f64;
+        let taken: f64 = self.tiles.iter().map(taken).sum();
         taken / (f64::from(self.size[0]) * f64::from(self.size[1]))
     }
 
     fn pixels(&self) -> impl Iterator<Item = ([u32; 2], f64, &Pixel)> {
         self.tiles.iter().flat_map(|tile| {
-            (0_u32..).zip(&tile.pixels).map(move |(i, pixel)| {
-                let [x, y] = tile.origin;
-                ([x + i % tile.size[0], y + i / tile.size[0]], f64::from(tile.samples), pixel)
-            })
+            let [x, y] = tile.origin;
+            let places = tile.order.iter().zip(&tile.pixels).enumerate();
+            places.map(move |(i, (place, pixel))| ([x + place[0], y + place[1]], tile.samples_of(i), pixel))
         })
     }
 
@@ -220,13 +247,24 @@ impl Film {
 mod tests {
     use super::*;
 
+    /// A sample for every pixel of a tile.
+    fn add_pass(tile: &mut Tile, sample: impl Fn([u32; 2], u32) -> PixelSample) {
+        let before = tile.samples();
+        while tile.samples() == before {
+            let (mut pixels, n) = tile.next(1);
+            let pixel = pixels.next().unwrap();
+            drop(pixels);
+            tile.add(&sample(pixel, n));
+        }
+    }
+
     #[test]
     fn mean_variance_and_depth_are_those_of_the_samples() {
         let mut film = Film::new([37, 19]);
         let samples = [0.5_f32, 1.5, 4.0];
         for tile in film.tiles_mut() {
             for _ in 0..3 {
-                tile.add_pass(|[x, y], n| {
+                add_pass(tile, |[x, y], n| {
                     let hit = n > 0;
                     PixelSample {
                         radiance: Rgb::new(samples[n as usize], x as f32, y as f32),
@@ -250,11 +288,11 @@ mod tests {
     fn a_tile_ahead_of_the_others_counts_for_itself() {
         let mut film = Film::new([32, 16]);
         let grey = |_: [u32; 2], _: u32| PixelSample { radiance: Rgb::WHITE, ..PixelSample::default() };
-        film.tiles_mut()[1].add_pass(grey);
+        add_pass(&mut film.tiles_mut()[1], grey);
         assert_eq!((film.samples(), film.mean_samples()), (0, 0.5));
         assert_eq!(film.relative_error(), None);
         for _ in 0..2 {
-            film.tiles_mut().iter_mut().for_each(|t| t.add_pass(grey));
+            film.tiles_mut().iter_mut().for_each(|t| add_pass(t, grey));
         }
         assert_eq!(film.relative_error(), Some(0.0));
     }
@@ -264,7 +302,7 @@ mod tests {
         // Samples 0 and 2 by turns: variance 1, mean 1, n = 400.
         let mut film = Film::new([16, 16]);
         for _ in 0..400 {
-            film.tiles_mut()[0].add_pass(|_, n| PixelSample {
+            add_pass(&mut film.tiles_mut()[0], |_, n| PixelSample {
                 radiance: Rgb::splat((n % 2) as f32 * 2.0),
                 ..PixelSample::default()
             });

@@ -3,12 +3,14 @@
 //!
 //! Light that glowing matter sends to other matter is left out.
 
-use crate::film::PixelSample;
+use super::Stop;
+use crate::film::{PixelSample, Tile};
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::Medium;
+use crate::medium::{MOST_LANES, Medium, PacketMarch, Track};
 use crate::scattering::Event;
 use crate::scene::Scene;
-use std::ops::ControlFlow;
+use crate::simd::{Kernel, Lanes, Level, one_minus_exp};
+use fearless_simd::prelude::*;
 
 /// Transmittance below which what is behind no longer shows.
 const OPAQUE: f32 = 1e-4;
@@ -20,61 +22,109 @@ pub struct RayMarch {
     step: f32,
     /// In the unit square, the same for every shaded point.
     light_points: Vec<[f32; 2]>,
+    level: Level,
 }
 
 impl RayMarch {
     /// `step` in voxels; `light_samples` points on each light that has an extent.
     #[must_use]
-    pub fn new(scene: &Scene, step: f32, light_samples: u32) -> Self {
-        let points = (0..light_samples).map(|i| hammersley(i, light_samples)).collect();
-        Self { step: step * scene.medium.volume().grid().voxel_size(), light_points: points }
+    pub fn new(scene: &Scene, step: f32, light_samples: u32, level: Level) -> Self {
+        let light_points = (0..light_samples).map(|i| hammersley(i, light_samples)).collect();
+        Self { step: step * scene.medium.volume().grid().voxel_size(), light_points, level }
     }
 
-    /// A pixel's `sample`-th ray. Samples serve the pixel filter and the lens alone; the first goes
-    /// through the pixel's middle.
-    #[must_use]
-    pub fn sample(&self, scene: &Scene, [x, y]: [u32; 2], sample: u32) -> PixelSample {
-        let [in_x, in_y] = spread(sample);
-        let film = [x as f32 + in_x, y as f32 + in_y];
-        // The lens point walks its own lattice, turned per pixel so that blur becomes grain, not ghosts.
-        let [turn_x, turn_y] = spread(y.wrapping_mul(7919).wrapping_add(x));
-        let [u, v] = spread(sample.wrapping_mul(3));
-        let ray = scene.camera.ray(scene.size, film, [(u + turn_x).fract(), (v + turn_y).fract()]);
-        self.march(scene, &ray)
+    /// Adds one ray to every pixel of a tile until each has `samples`; see [`super::Integrator::refine`].
+    pub(super) fn refine(
+        &self,
+        scene: &Scene,
+        tile: &mut Tile,
+        pending: &mut Option<Box<Packet>>,
+        samples: u32,
+        stop: &Stop,
+    ) {
+        self.level.run(Refine { raymarch: self, scene, tile, pending, samples, stop });
     }
 
     /// The radiance that arrives along a world ray.
     #[must_use]
     pub fn march(&self, scene: &Scene, ray: &Ray) -> PixelSample {
+        self.level.run(March { raymarch: self, scene, packet: Packet::new(scene, [*ray].into_iter()) })
+    }
+
+    /// A pixel's `sample`-th ray. Samples serve the pixel filter and the lens alone; the first goes
+    /// through the pixel's middle.
+    fn ray(scene: &Scene, [x, y]: [u32; 2], sample: u32) -> Ray {
+        let [in_x, in_y] = spread(sample);
+        let film = [x as f32 + in_x, y as f32 + in_y];
+        // The lens point walks its own lattice, turned per pixel so that blur becomes grain, not ghosts.
+        let [turn_x, turn_y] = spread(y.wrapping_mul(7919).wrapping_add(x));
+        let [u, v] = spread(sample.wrapping_mul(3));
+        scene.camera.ray(scene.size, film, [(u + turn_x).fract(), (v + turn_y).fract()])
+    }
+
+    /// Marches a packet to its end, or for one shaded point at least when told to stop; gives whether it has ended.
+    #[inline(always)]
+    fn go_on<S: Lanes>(&self, simd: S, scene: &Scene, packet: &mut Packet, stop: &Stop) -> bool {
         let medium = &*scene.medium;
-        let track = medium.track(ray, f32::INFINITY);
-        let along_view = ray.direction.dot(scene.camera.view());
-        let mut seen = PixelSample::default();
-        let mut transmittance = 1.0_f32;
-        let _ = medium.march(&track, self.step, |t, width, place| {
-            let optics = medium.optics(place);
-            let thickness = medium.density() * optics.opacity * width;
-            if thickness <= 0.0 {
-                return ControlFlow::Continue(());
+        let shines = scene.render.max_scatter > 0 || medium.transfer().emits();
+        let most = S::f32s::splat(simd, 1.0 - OPAQUE);
+        let mut alpha = S::f32s::from_slice(simd, &packet.alpha[..S::WIDTH]);
+        let mut depth = S::f32s::from_slice(simd, &packet.depth[..S::WIDTH]);
+        let mut march = PacketMarch::<S>::new(simd, medium, &packet.tracks, self.step);
+        march.go_to(S::i32s::from_slice(simd, &packet.k[..S::WIDTH]));
+        march.active &= alpha.simd_lt(most);
+        let mut moved = false;
+        loop {
+            let k = march.step();
+            let Some(sample) = march.next() else { break };
+            // The sum of all shares so far leaves this transmittance.
+            let covered = one_minus_exp(simd, sample.thickness) * (-alpha + 1.0);
+            for lane in packet.shaded..packet.count {
+                let covered = covered.as_slice()[lane];
+                if !shines || covered <= 0.0 {
+                    continue;
+                }
+                if moved && stop.reached() {
+                    // The same sample comes again, of which some lanes are shaded already.
+                    packet.shaded = lane;
+                    k.store_slice(&mut packet.k[..S::WIDTH]);
+                    alpha.store_slice(&mut packet.alpha[..S::WIDTH]);
+                    depth.store_slice(&mut packet.depth[..S::WIDTH]);
+                    return false;
+                }
+                let [x, y, z] = sample.place;
+                let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
+                let w_out = -packet.rays[lane].direction;
+                let source = self.source(simd, scene, place, sample.value.as_slice()[lane], w_out);
+                packet.radiance[lane] += source * covered;
+                moved = true;
             }
-            let mut source = Medium::emitted(&optics);
-            if scene.render.max_scatter > 0 {
-                let here = medium.volume().grid().index_to_world(place);
-                source += self.direct(scene, &medium.event(place, &optics), here, -ray.direction);
-            }
-            let covered = -(-thickness).exp_m1() * transmittance;
-            seen.radiance += source * covered;
-            seen.depth += track.distance(t) * along_view * covered;
-            seen.alpha += covered;
-            transmittance -= covered;
-            if transmittance < OPAQUE { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
-        seen.radiance += scene.behind(ray.direction) * (1.0 - seen.alpha);
-        seen
+            packet.shaded = 0;
+            alpha += covered;
+            depth += sample.t * covered;
+            march.active &= alpha.simd_lt(most);
+        }
+        alpha.store_slice(&mut packet.alpha[..S::WIDTH]);
+        depth.store_slice(&mut packet.depth[..S::WIDTH]);
+        true
+    }
+
+    /// What a point adds to a ray that goes along `w_out`, per unit of extinction.
+    #[inline(always)]
+    fn source<S: Lanes>(&self, simd: S, scene: &Scene, place: Vec3, value: f32, w_out: Vec3) -> Rgb {
+        let medium = &*scene.medium;
+        let optics = medium.transfer().optics(value);
+        let emitted = Medium::emitted(&optics);
+        if scene.render.max_scatter == 0 {
+            return emitted;
+        }
+        let here = medium.volume().grid().index_to_world(place);
+        emitted + self.direct(simd, scene, &medium.event(place, &optics), here, w_out)
     }
 
     /// Light from every lamp that a point scatters to `w_out`, per unit extinction.
-    fn direct(&self, scene: &Scene, event: &Event, here: Vec3, w_out: Vec3) -> Rgb {
+    #[inline(always)]
+    fn direct<S: Lanes>(&self, simd: S, scene: &Scene, event: &Event, here: Vec3, w_out: Vec3) -> Rgb {
         let medium = &*scene.medium;
         let mut sum = Rgb::BLACK;
         for light in scene.lights.lights() {
@@ -87,11 +137,109 @@ impl RayMarch {
                     continue;
                 }
                 let track = medium.track(&Ray::new(here, sample.direction), sample.distance);
-                let thickness = medium.optical_thickness(&track, self.step, -OPAQUE.ln());
+                let thickness = medium.thickness_lanes(simd, &track, self.step, -OPAQUE.ln());
                 sum += unshadowed * (-thickness).exp();
             }
         }
         sum
+    }
+}
+
+/// Rays that march together, at most one per lane.
+#[derive(Clone, Debug)]
+pub(super) struct Packet {
+    count: usize,
+    rays: [Ray; MOST_LANES],
+    tracks: [Track; MOST_LANES],
+    /// The step to go on with.
+    k: [i32; MOST_LANES],
+    /// Lanes whose point at that step has been shaded already.
+    shaded: usize,
+    radiance: [Rgb; MOST_LANES],
+    alpha: [f32; MOST_LANES],
+    /// Sum of the distances inside the medium, weighted by what they add to `alpha`.
+    depth: [f32; MOST_LANES],
+}
+
+impl Packet {
+    fn new(scene: &Scene, rays: impl Iterator<Item = Ray>) -> Self {
+        let mut packet = Self {
+            count: 0,
+            rays: [Ray::default(); MOST_LANES],
+            tracks: [Track::default(); MOST_LANES],
+            k: [0; MOST_LANES],
+            shaded: 0,
+            radiance: [Rgb::BLACK; MOST_LANES],
+            alpha: [0.0; MOST_LANES],
+            depth: [0.0; MOST_LANES],
+        };
+        for ray in rays {
+            packet.rays[packet.count] = ray;
+            packet.tracks[packet.count] = scene.medium.track(&ray, f32::INFINITY);
+            packet.count += 1;
+        }
+        packet
+    }
+
+    /// What a ray has found in the end.
+    fn sample(&self, scene: &Scene, lane: usize) -> PixelSample {
+        let (alpha, direction) = (self.alpha[lane], self.rays[lane].direction);
+        let distance = self.depth[lane] + alpha * self.tracks[lane].distance(0.0);
+        PixelSample {
+            radiance: self.radiance[lane] + scene.behind(direction) * (1.0 - alpha),
+            alpha,
+            depth: distance * direction.dot(scene.camera.view()),
+        }
+    }
+}
+
+struct Refine<'a> {
+    raymarch: &'a RayMarch,
+    scene: &'a Scene,
+    tile: &'a mut Tile,
+    pending: &'a mut Option<Box<Packet>>,
+    samples: u32,
+    stop: &'a Stop,
+}
+
+impl Kernel for Refine<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, simd: S) {
+        let Self { raymarch, scene, tile, pending, samples, stop } = self;
+        while tile.samples() < samples {
+            let mut packet = pending.take().unwrap_or_else(|| {
+                let (pixels, sample) = tile.next(S::WIDTH);
+                Box::new(Packet::new(scene, pixels.map(|pixel| RayMarch::ray(scene, pixel, sample))))
+            });
+            if !raymarch.go_on(simd, scene, &mut packet, stop) {
+                *pending = Some(packet);
+                return;
+            }
+            for lane in 0..packet.count {
+                tile.add(&packet.sample(scene, lane));
+            }
+            if stop.reached() {
+                return;
+            }
+        }
+    }
+}
+
+struct March<'a> {
+    raymarch: &'a RayMarch,
+    scene: &'a Scene,
+    packet: Packet,
+}
+
+impl Kernel for March<'_> {
+    type Output = PixelSample;
+
+    #[inline(always)]
+    fn run<S: Lanes>(mut self, simd: S) -> PixelSample {
+        while !self.raymarch.go_on(simd, self.scene, &mut self.packet, &Stop::default()) {}
+        self.packet.sample(self.scene, 0)
     }
 }
 

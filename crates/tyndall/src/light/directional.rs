@@ -15,14 +15,17 @@ pub struct Directional {
     cap: f32,
 }
 
+/// Half the angle of the narrowest cone, in radians.
+const NARROWEST: f32 = 1e-7;
+
 impl Directional {
     /// `travel` is where the light goes (any length but zero), `irradiance` what a surface facing it
     /// receives, `angle` the full cone in degrees, 0 (sharp) to 180.
     #[must_use]
     pub fn new(travel: Vec3, irradiance: Rgb, angle: f32) -> Self {
         let half = 0.5 * angle.to_radians();
-        // 1 - cos without cancellation.
-        let cap = 2.0 * (0.5 * half).sin().powi(2);
+        // 1 - cos without cancellation. A narrower cone is sharp: single precision tells its directions not apart.
+        let cap = if half < NARROWEST { 0.0 } else { 2.0 * (0.5 * half).sin().powi(2) };
         Self { frame: Frame::around(-travel.normalize()), irradiance, cap }
     }
 
@@ -63,5 +66,23 @@ impl Directional {
 
     pub(super) fn strength(&self) -> f64 {
         f64::from(self.irradiance.luminance())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cone_too_narrow_for_single_precision_is_sharp() {
+        let sun = |angle| Directional::new(-Vec3::Y, Rgb::splat(3.0), angle);
+        assert!(!sun(1e-4).is_sharp());
+        for angle in [1e-6, 1e-20, 1e-38, 1e-45] {
+            let sample = sun(angle).sample([0.3, 0.6]);
+            assert!(
+                sample.is_some_and(|s| s.radiance == Rgb::splat(3.0) && s.pdf.is_infinite()),
+                "{angle:e}"
+            );
+        }
     }
 }

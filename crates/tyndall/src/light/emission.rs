@@ -4,7 +4,7 @@ use super::{LightSample, Target};
 use crate::math::{Bounds, Vec3};
 use crate::medium::Medium;
 use crate::sampling::{Discrete, Stream};
-use crate::volume::Bricks;
+use crate::volume::Cells;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ const CAUTION: f32 = 0.1;
 /// Glowing cells of a medium, weighted by what they emit.
 #[derive(Clone, Debug)]
 pub struct Emission {
-    bricks: Arc<Bricks>,
+    places: Arc<Cells>,
     cells: Discrete,
     /// Number of the cell behind each weight, ascending.
     numbers: Vec<usize>,
@@ -36,20 +36,20 @@ impl Emission {
             return None;
         }
         let grid = medium.volume().grid();
-        let bricks = medium.volume().bricks_of(CELL);
+        let places = medium.volume().cells_of(CELL);
         let voxel_volume = grid.voxel_size().powi(3);
         let glowing = |(number, &values): (usize, &[f32; 2])| {
             let most = medium.transfer().emission_bound(values);
-            let b = bricks.cell_bounds(number, &grid.index_bounds());
+            let b = places.cell_bounds(number, &grid.index_bounds());
             let emitted = (1.0 - CAUTION) * mean_emission(medium, &b) + CAUTION * most;
             let power = emitted * medium.density() * voxel_volume * b.size().element_product();
             (most > 0.0).then_some((number, b, f64::from(power)))
         };
-        let cells: Vec<_> = bricks.ranges().par_iter().enumerate().filter_map(glowing).collect();
+        let cells: Vec<_> = places.ranges().par_iter().enumerate().filter_map(glowing).collect();
         let numbers = cells.iter().map(|c| c.0).collect();
         let bounds = cells.iter().map(|c| c.1).collect();
         let cells = Discrete::new(cells.iter().map(|c| c.2))?;
-        Some(Self { bricks, cells, numbers, bounds, voxel_volume })
+        Some(Self { places, cells, numbers, bounds, voxel_volume })
     }
 
     /// As [`super::Light::strength`]: the power, as if it all came from the target's middle to its border.
@@ -92,7 +92,7 @@ impl Emission {
     /// with extinction `sigma_t`, `distance` world units away.
     #[must_use]
     pub fn pdf(&self, place: Vec3, sigma_t: f32, distance: f32) -> f32 {
-        let number = self.bricks.cell_at(place);
+        let number = self.places.cell_at(place);
         let Ok(i) = self.numbers.binary_search(&number) else { return 0.0 };
         let volume = self.bounds[i].size().element_product() * self.voxel_volume;
         self.cells.probability(i) / volume * distance * distance / sigma_t

@@ -1,6 +1,6 @@
 //! Light from all around: constant, or a map of latitude and longitude.
 
-use super::{LightSample, Passed};
+use super::{BRIGHTEST, LightSample, Passed};
 use crate::math::{Frame, Ray, Rgb, Vec3, cast};
 use crate::sampling::{Discrete, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
@@ -112,8 +112,8 @@ pub enum MapError {
         /// Rows.
         height: usize,
     },
-    /// A texel is negative or not finite.
-    #[error("texel ({x}, {y}) is {texel:?}: expected finite radiance of at least 0")]
+    /// A texel is negative, not finite, or beyond [`BRIGHTEST`].
+    #[error("texel ({x}, {y}) is {texel:?}: expected radiance from 0 to {BRIGHTEST:e}")]
     Texel {
         /// Column.
         x: usize,
@@ -133,7 +133,8 @@ impl Map {
         if texels.is_empty() || texels.len() != width.saturating_mul(height) {
             return Err(MapError::Size { found: texels.len(), width, height });
         }
-        let bad = texels.iter().position(|t| !t.is_finite() || t.min_component() < 0.0);
+        let bad =
+            texels.iter().position(|t| !t.to_array().into_iter().all(|x| (0.0..=BRIGHTEST).contains(&x)));
         if let Some(i) = bad {
             return Err(MapError::Texel { x: i % width, y: i / width, texel: texels[i].to_array() });
         }

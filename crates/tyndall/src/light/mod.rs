@@ -17,6 +17,10 @@ pub use set::LightSet;
 
 use crate::math::{Ray, Rgb, Vec3};
 
+/// The largest radiance, irradiance, intensity and emission that a scene may have: single precision holds its square,
+/// which the variance of the picture needs.
+pub const BRIGHTEST: f32 = 1e18;
+
 /// A sphere around all that can be lit: what lights judge their power by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {

@@ -4,7 +4,7 @@ use super::Vec3;
 
 /// A half line. `direction` has unit length in world space; in index space it is scaled so that
 /// `t` stays a world distance.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Ray {
     /// Where it starts.
     pub origin: Vec3,

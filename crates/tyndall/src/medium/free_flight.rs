@@ -4,10 +4,11 @@
 //! the largest extinction. Where these agree the cell is homogeneous and nothing is looked up. A step too
 //! short for single precision still goes on by the last place, so that no walk stands still.
 
-use super::{CellStretch, Medium, Track};
-use crate::math::{Vec3, cast};
+use super::{MOST_LANES, Medium, Track};
+use crate::math::Vec3;
 use crate::sampling::Stream;
-use std::ops::ControlFlow;
+use crate::simd::{Kernel, Lanes, Level};
+use fearless_simd::prelude::*;
 
 /// Below this weight a transmittance estimate lives on by chance: darker ones are not worth their look-ups.
 const ROULETTE_WEIGHT: f32 = 0.1;
@@ -36,7 +37,7 @@ impl Medium {
     #[must_use]
     pub fn free_flight(&self, track: &Track, first: f32, stream: &mut Stream) -> Option<Collision> {
         let mut depth = first;
-        let end = self.majorants.walk(track, |cell| {
+        for cell in self.majorants.walk(track) {
             let majorant = cell.most * self.density;
             let mut t = cell.start;
             // False at once in an empty cell, where the step is infinite or 0/0.
@@ -47,28 +48,28 @@ impl Medium {
                 let value = self.volume.value(place);
                 // Below the smallest opacity the collision is real whatever stands there.
                 if level < cell.least || level < self.transfer.opacity(value) {
-                    return ControlFlow::Break(Collision { t, place, value });
+                    return Some(Collision { t, place, value });
                 }
                 depth = stream.exponential();
             }
             depth = (depth - (cell.end - t) * majorant).max(0.0);
-            ControlFlow::Continue(())
-        });
-        end.break_value()
+        }
+        None
     }
 
     /// An unbiased estimate of the transmittance along a track: residual ratio tracking \[Novak14\], in
-    /// which each cell's smallest extinction is the control and is integrated exactly.
-    #[inline]
-    #[must_use]
-    pub fn transmittance(&self, track: &Track, stream: &mut Stream) -> f32 {
+    /// which each cell's smallest extinction is the control and is integrated exactly. Where the tentative collisions lie
+    /// does not depend on what is found there, so that many are looked up at once.
+    #[inline(always)]
+    pub(crate) fn transmittance_lanes<S: Lanes>(&self, simd: S, track: &Track, stream: &mut Stream) -> f32 {
         let mut transmittance = 1.0_f32;
         let mut control = 0.0_f32;
         let mut depth = stream.exponential();
-        let end = self.majorants.walk(track, |cell| {
+        let mut collisions = Tentative::new();
+        for cell in self.majorants.walk(track) {
             if control > ROULETTE_DEPTH {
                 if stream.uniform() >= (-ROULETTE_DEPTH).exp() {
-                    return ControlFlow::Break(());
+                    return 0.0;
                 }
                 control -= ROULETTE_DEPTH;
             }
@@ -76,72 +77,93 @@ impl Medium {
             let spread = cell.most - cell.least;
             let majorant = spread * self.density;
             let mut t = cell.start;
+            // False at once in a homogeneous cell, where the step is infinite or 0/0.
             while t + depth / majorant < cell.end {
                 t = (t + depth / majorant).max(t.next_up());
-                let residual = self.transfer.opacity(self.volume.value(track.at(t))) - cell.least;
-                transmittance *= 1.0 - (residual / spread).clamp(0.0, 1.0);
-                if transmittance < ROULETTE_WEIGHT {
-                    if stream.uniform() * ROULETTE_WEIGHT >= transmittance {
-                        return ControlFlow::Break(());
+                if collisions.push::<S>(t, cell.least, spread) {
+                    transmittance *= collisions.take(simd, self, track);
+                    if transmittance < ROULETTE_WEIGHT {
+                        if stream.uniform() * ROULETTE_WEIGHT >= transmittance {
+                            return 0.0;
+                        }
+                        transmittance = ROULETTE_WEIGHT;
                     }
-                    transmittance = ROULETTE_WEIGHT;
                 }
                 depth = stream.exponential();
             }
             depth = (depth - (cell.end - t) * majorant).max(0.0);
-            ControlFlow::Continue(())
-        });
-        if end.is_break() { 0.0 } else { transmittance * (-control).exp() }
+        }
+        transmittance * collisions.take(simd, self, track) * (-control).exp()
     }
 
-    /// Optical thickness along a track by the midpoint rule on one grid of steps per track. Steps in
-    /// empty cells are skipped, which changes nothing; stops where it passes `enough`.
-    #[inline]
+    /// [`Self::transmittance_lanes`] by itself: an unbiased estimate of the transmittance along a track.
     #[must_use]
-    pub fn optical_thickness(&self, track: &Track, step: f32, enough: f32) -> f32 {
-        let mut thickness = 0.0;
-        let _ = self.march(track, step, |_, width, place| {
-            thickness += self.sigma_t(place) * width;
-            if thickness > enough { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
-        thickness
+    pub fn transmittance(&self, level: Level, track: &Track, stream: &mut Stream) -> f32 {
+        struct Estimate<'a>(&'a Medium, &'a Track, &'a mut Stream);
+        impl Kernel for Estimate<'_> {
+            type Output = f32;
+
+            #[inline(always)]
+            fn run<S: Lanes>(self, simd: S) -> f32 {
+                self.0.transmittance_lanes(simd, self.1, self.2)
+            }
+        }
+        level.run(Estimate(self, track, stream))
+    }
+}
+
+/// Tentative collisions, gathered until there are enough for the lanes.
+struct Tentative {
+    t: [f32; MOST_LANES],
+    least: [f32; MOST_LANES],
+    spread: [f32; MOST_LANES],
+    count: usize,
+    enough: usize,
+}
+
+/// So many at first, since light is often lost at once; then twice as many each time.
+const FIRST_TENTATIVE: usize = 2;
+
+impl Tentative {
+    #[inline(always)]
+    fn new() -> Self {
+        Self {
+            t: [0.0; MOST_LANES],
+            least: [0.0; MOST_LANES],
+            spread: [1.0; MOST_LANES],
+            count: 0,
+            enough: FIRST_TENTATIVE,
+        }
     }
 
-    /// Visits the midpoints of the steps of a track that may hold matter, nearest first, with the
-    /// distance, the step's width and the index-space place.
-    ///
-    /// Step `k` covers `[k step, (k+1) step]`, the last one what is left. The grid does not depend on
-    /// the transfer function, so skipping leaves every sample where it was.
-    #[inline]
-    pub fn march<B>(
-        &self,
-        track: &Track,
-        step: f32,
-        mut visit: impl FnMut(f32, f32, Vec3) -> ControlFlow<B>,
-    ) -> ControlFlow<B> {
-        let whole = cast::index(track.length / step);
-        let rest = (track.length - whole as f32 * step).max(0.0);
-        // A sliver of the last bit would be a step of no width.
-        let steps = whole + usize::from(rest > 1e-4 * step);
-        let mut k = 0;
-        let midpoint =
-            |k: usize| if k < whole { (k as f32 + 0.5) * step } else { whole as f32 * step + 0.5 * rest };
-        self.majorants.walk(track, |cell: CellStretch| {
-            if cell.most <= 0.0 {
-                // To the last step whose midpoint may lie in this cell; the loop below corrects it.
-                k = k.max(cast::index(cell.end / step - 0.5)).min(steps);
-                while k < steps && midpoint(k) < cell.end {
-                    k += 1;
-                }
-                return ControlFlow::Continue(());
-            }
-            while k < steps && midpoint(k) < cell.end {
-                let t = midpoint(k);
-                let width = if k < whole { step } else { rest };
-                k += 1;
-                visit(t, width, track.at(t))?;
-            }
-            ControlFlow::Continue(())
-        })
+    /// Whether there are enough.
+    #[inline(always)]
+    fn push<S: Lanes>(&mut self, t: f32, least: f32, spread: f32) -> bool {
+        self.t[self.count] = t;
+        self.least[self.count] = least;
+        self.spread[self.count] = spread;
+        self.count += 1;
+        self.count == S::WIDTH.min(self.enough)
+    }
+
+    /// The product of the chances that the pending collisions are no real ones.
+    #[inline(always)]
+    fn take<S: Lanes>(&mut self, simd: S, medium: &Medium, track: &Track) -> f32 {
+        if self.count == 0 {
+            return 1.0;
+        }
+        let place = track.lanes(simd, S::f32s::from_slice(simd, &self.t[..S::WIDTH]));
+        let value = medium.volume.value_lanes(simd, place);
+        let least = S::f32s::from_slice(simd, &self.least[..S::WIDTH]);
+        let spread = S::f32s::from_slice(simd, &self.spread[..S::WIDTH]);
+        let residual = medium.transfer.opacity_lanes(simd, value) - least;
+        let chance = (residual / spread).max(0.0).min(1.0);
+        let mut product = 1.0;
+        for chance in &chance.as_slice()[..self.count] {
+            product *= 1.0 - chance;
+        }
+        self.count = 0;
+        self.enough = (2 * self.enough).min(MOST_LANES);
+        product
     }
 }

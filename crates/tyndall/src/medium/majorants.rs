@@ -1,20 +1,22 @@
 //! Opacity bounds per cell and the walk of a ray through the cells (3D-DDA \[Amanatides87\]).
 
 use super::{Track, reach};
-use crate::math::cast;
+use crate::math::{Vec3, cast};
 use crate::transfer::TransferFunction;
 use crate::volume::Volume;
 use rayon::prelude::*;
-use std::ops::ControlFlow;
 
 /// Smallest and largest opacity per cell. Independent of the density, so that scaling it costs nothing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MajorantGrid {
     dims: [i32; 3],
-    cell: f32,
+    edge: f32,
     opacities: Vec<[f32; 2]>,
     /// How many cells to every side hold the same single opacity: a ray crosses them in one stretch.
     reach: Vec<u8>,
+    /// One more than the reach of an empty cell, 0 for one that holds matter; for kernels over lanes, which may read
+    /// some bytes past a cell's.
+    empty: Vec<u8>,
 }
 
 /// The stretch of a track inside one cell, or inside several of the same single opacity.
@@ -31,16 +33,19 @@ pub struct CellStretch {
 }
 
 impl MajorantGrid {
-    /// Bounds for cells of `cell` voxels (0: one cell around everything), in parallel on the current pool.
+    /// Bounds for cells of `edge` voxels (0: one cell around everything), in parallel on the current pool.
     #[must_use]
-    pub fn new(volume: &Volume, transfer: &TransferFunction, cell: usize) -> Self {
-        let bricks = volume.bricks_of(cell);
+    pub fn new(volume: &Volume, transfer: &TransferFunction, edge: usize) -> Self {
+        let cells = volume.cells_of(edge);
         let opacities: Vec<[f32; 2]> =
-            bricks.ranges().par_iter().map(|&values| transfer.opacity_range(values)).collect();
+            cells.ranges().par_iter().map(|&values| transfer.opacity_range(values)).collect();
+        let reach = reach::reach(cells.dims(), &opacities);
+        let empty = opacities.iter().zip(&reach).map(|(o, reach)| if o[1] <= 0.0 { reach + 1 } else { 0 });
         Self {
-            dims: bricks.dims().map(|n| cast::fit_u32(n).cast_signed()),
-            cell: bricks.cell() as f32,
-            reach: reach::reach(bricks.dims(), &opacities),
+            dims: cells.dims().map(|n| cast::fit_u32(n).cast_signed()),
+            edge: cells.edge() as f32,
+            empty: empty.chain([0; 3]).collect(),
+            reach,
             opacities,
         }
     }
@@ -51,71 +56,132 @@ impl MajorantGrid {
         &self.opacities
     }
 
-    /// Visits the cells along a track in order until `visit` breaks.
+    /// Cells along each axis.
+    pub(super) fn dims(&self) -> [i32; 3] {
+        self.dims
+    }
+
+    /// Voxels along a cell's edge.
+    pub(super) fn edge(&self) -> f32 {
+        self.edge
+    }
+
+    /// Per cell how many cells on to each side end what is empty around it, itself included; 0 where there is matter.
+    pub(super) fn empty(&self) -> &[u8] {
+        &self.empty
+    }
+
+    /// The cells along a track in order.
     #[inline]
-    pub fn walk<B>(
-        &self,
-        track: &Track,
-        mut visit: impl FnMut(CellStretch) -> ControlFlow<B>,
-    ) -> ControlFlow<B> {
-        if track.length <= 0.0 {
-            return ControlFlow::Continue(());
-        }
-        let per_cell = 1.0 / self.cell;
-        let entry = (track.ray.origin + 0.5) * per_cell;
+    #[must_use]
+    pub fn walk(&self, track: &Track) -> CellWalk<'_> {
+        CellWalk::new(self, track)
+    }
+}
+
+/// Goes along a track from cell to cell; the stretches join without gaps.
+#[derive(Clone, Debug)]
+pub struct CellWalk<'a> {
+    grid: &'a MajorantGrid,
+    /// Where the track begins, and where it goes, in cells.
+    entry: Vec3,
+    direction: Vec3,
+    inverse: Vec3,
+    sign: [i32; 3],
+    /// The present cell.
+    place: [i32; 3],
+    /// Where the track leaves it along each axis.
+    next: [f32; 3],
+    start: f32,
+    length: f32,
+}
+
+impl<'a> CellWalk<'a> {
+    #[inline]
+    fn new(grid: &'a MajorantGrid, track: &Track) -> Self {
+        let per_cell = 1.0 / grid.edge;
+        let entry = track.ray.origin * per_cell;
         let direction = track.ray.direction * per_cell;
-        let [nx, ny, nz] = self.dims;
-        let mut place = [
-            cast::floor_i32(entry.x).clamp(0, nx - 1),
-            cast::floor_i32(entry.y).clamp(0, ny - 1),
-            cast::floor_i32(entry.z).clamp(0, nz - 1),
-        ];
-        let strides = [1, nx as isize, nx as isize * ny as isize];
-        let number = |[x, y, z]: [i32; 3]| {
-            (x as isize + y as isize * strides[1] + z as isize * strides[2]).cast_unsigned()
+        let along = |a: usize| cast::floor_i32(entry[a]).clamp(0, grid.dims[a] - 1);
+        let sign = |a: usize| i32::from(direction[a] > 0.0) - i32::from(direction[a] < 0.0);
+        let mut walk = Self {
+            grid,
+            entry,
+            direction,
+            inverse: Vec3::new(direction.x.recip(), direction.y.recip(), direction.z.recip()),
+            sign: [sign(0), sign(1), sign(2)],
+            place: [along(0), along(1), along(2)],
+            next: [0.0; 3],
+            start: 0.0,
+            length: track.length,
         };
-        let sign = [0, 1, 2].map(|a| i32::from(direction[a] > 0.0) - i32::from(direction[a] < 0.0));
-        let inverse = [0, 1, 2].map(|a| direction[a].recip());
-        // Where the ray leaves the cells up to `last` along an axis.
-        let exit = |axis: usize, last: i32| match sign[axis] {
-            0 => f32::INFINITY,
-            forward => ((last + i32::from(forward > 0)) as f32 - entry[axis]) * inverse[axis],
-        };
-        let mut next = [0, 1, 2].map(|axis| exit(axis, place[axis]));
-        let mut start = 0.0_f32;
-        loop {
-            let cell = number(place);
-            let reach = i32::from(self.reach[cell]);
-            let (through, leave) = if reach == 0 {
-                nearest(next)
-            } else {
-                nearest([0, 1, 2].map(|axis| exit(axis, place[axis] + reach * sign[axis])))
-            };
-            let end = leave.min(track.length);
-            if end > start {
-                let [least, most] = self.opacities[cell];
-                visit(CellStretch { start, end, least, most })?;
-                start = end;
-            }
-            if start >= track.length {
-                return ControlFlow::Continue(());
-            }
-            if reach > 0 {
-                // Across all alike cells at once: the other axes have moved on as well.
-                let there = entry + direction * leave;
-                for axis in (0..3).filter(|&axis| axis != through) {
-                    let (first, last) = (place[axis] - reach, place[axis] + reach);
-                    place[axis] =
-                        cast::floor_i32(there[axis]).clamp(first.max(0), last.min(self.dims[axis] - 1));
-                    next[axis] = exit(axis, place[axis]);
-                }
-            }
-            place[through] += sign[through] * (reach + 1);
-            if place[through] < 0 || place[through] >= self.dims[through] {
-                return ControlFlow::Continue(());
-            }
-            next[through] = exit(through, place[through]);
+        walk.next = walk.exits(0);
+        walk
+    }
+
+    /// Where the track leaves the cells up to `reach` away, along each axis.
+    #[inline(always)]
+    fn exits(&self, reach: i32) -> [f32; 3] {
+        let exit = |axis: usize| self.exit(axis, self.place[axis] + reach * self.sign[axis]);
+        [exit(0), exit(1), exit(2)]
+    }
+
+    /// Where the track leaves the cells up to `last` along an axis; the outermost reach to the track's end.
+    #[inline(always)]
+    fn exit(&self, axis: usize, last: i32) -> f32 {
+        let border = last + i32::from(self.sign[axis] > 0);
+        if self.sign[axis] != 0 && border > 0 && border < self.grid.dims[axis] {
+            (border as f32 - self.entry[axis]) * self.inverse[axis]
+        } else {
+            f32::INFINITY
         }
+    }
+}
+
+impl Iterator for CellWalk<'_> {
+    type Item = CellStretch;
+
+    // Kernels over lanes must find it inside themselves.
+    #[inline(always)]
+    fn next(&mut self) -> Option<CellStretch> {
+        let (nx, ny) = (self.grid.dims[0] as isize, self.grid.dims[1] as isize);
+        while self.start < self.length {
+            let [x, y, z] = self.place;
+            let (x, y, z) = (x as isize, y as isize, z as isize);
+            let cell = (x + nx * (y + ny * z)).cast_unsigned();
+            let reach = i32::from(self.grid.reach[cell]);
+            let (through, leave) = if reach == 0 { nearest(self.next) } else { nearest(self.exits(reach)) };
+            let start = self.start;
+            let end = leave.min(self.length);
+            if end < self.length {
+                self.step(through, leave, reach);
+            }
+            if end > start {
+                self.start = end;
+                let [least, most] = self.grid.opacities[cell];
+                return Some(CellStretch { start, end, least, most });
+            }
+        }
+        None
+    }
+}
+
+impl CellWalk<'_> {
+    /// Into the next cell through the border of `axis` at distance `leave`.
+    #[inline]
+    fn step(&mut self, through: usize, leave: f32, reach: i32) {
+        if reach > 0 {
+            // Across all alike cells at once: the other axes have moved on as well.
+            let there = self.entry + self.direction * leave;
+            for axis in (0..3).filter(|&axis| axis != through) {
+                let (first, last) = (self.place[axis] - reach, self.place[axis] + reach);
+                self.place[axis] =
+                    cast::floor_i32(there[axis]).clamp(first.max(0), last.min(self.grid.dims[axis] - 1));
+                self.next[axis] = self.exit(axis, self.place[axis]);
+            }
+        }
+        self.place[through] += self.sign[through] * (reach + 1);
+        self.next[through] = self.exit(through, self.place[through]);
     }
 }
 

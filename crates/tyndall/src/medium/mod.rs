@@ -5,11 +5,13 @@
 mod clip;
 mod free_flight;
 mod majorants;
+mod march;
 mod reach;
 
 pub use clip::{Clip, ClipShape};
 pub use free_flight::Collision;
-pub use majorants::{CellStretch, MajorantGrid};
+pub use majorants::{CellStretch, CellWalk, MajorantGrid};
+pub(crate) use march::{MOST_LANES, PacketMarch};
 
 use crate::math::{Interval, Ray, Rgb, Vec3, cast};
 use crate::scattering::{Brdf, Event, Phase, Surface, surface_share};
@@ -41,6 +43,8 @@ pub struct Medium {
     transfer: Arc<TransferFunction>,
     majorants: Arc<MajorantGrid>,
     clip: Clip,
+    /// No track is longer: the diagonal of the box, world units.
+    longest: f32,
     density: f32,
     phase: Phase,
     brdf: Brdf,
@@ -49,7 +53,7 @@ pub struct Medium {
 
 /// A ray inside the medium: in index space, where `t` is still the world distance, from where it
 /// enters to where it leaves or ends.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Track {
     /// Starts where the medium does, which keeps distances small and so exact.
     ray: Ray,
@@ -87,6 +91,7 @@ impl Medium {
         let majorants = MajorantGrid::new(&volume, &transfer, settings.majorant_cell);
         Self {
             clip: Clip::new(volume.grid(), &settings.clip),
+            longest: volume.grid().diagonal(),
             majorants: Arc::new(majorants),
             density: settings.density,
             phase: settings.phase,
@@ -139,7 +144,9 @@ impl Medium {
             return Track { ray: inside, length: 0.0, before: 0.0 };
         }
         let ray = Ray::new(inside.at(stretch.start), inside.direction);
-        Track { ray, length: stretch.end - stretch.start, before: stretch.start }
+        // From very far away the difference of the two distances may be anything.
+        let length = (stretch.end - stretch.start).min(self.longest);
+        Track { ray, length, before: stretch.start }
     }
 
     /// Whether matter may be at an index-space place: inside the box and not cut away.
@@ -194,6 +201,28 @@ mod tests {
     use super::*;
     use crate::transfer::Point;
     use crate::volume::{Grid, ValueMap, Voxels};
+
+    #[test]
+    fn from_far_away_no_track_is_longer_than_the_box() {
+        let grid = Grid::centred([4, 3, 2], [1e-6; 3]).unwrap();
+        let volume = Arc::new(Volume::new(grid, Voxels::U8((0..24).collect()), ValueMap::IDENTITY).unwrap());
+        let transfer = TransferFunction::new(vec![Point { value: 0.0, optics: Optics::default() }]).unwrap();
+        let settings = MediumSettings {
+            density: 1.0,
+            phase: Phase::Isotropic,
+            brdf: Brdf::Lambert,
+            gradient_factor: 3.0,
+            clip: Vec::new(),
+            majorant_cell: 8,
+        };
+        let medium = Medium::new(volume, Arc::new(transfer), &settings);
+        for i in 0..1000_u16 {
+            let aim = Vec3::new(f32::from(i % 10), f32::from(i / 10 % 10), f32::from(i / 100)) * 4e-7 - 2e-6;
+            let from = Vec3::new(-3e9, 7e9, 1e10);
+            let track = medium.track(&Ray::new(from, (aim - from).normalize()), f32::INFINITY);
+            assert!(track.length() <= 6e-6, "{}", track.length());
+        }
+    }
 
     #[test]
     fn an_edge_of_the_data_is_a_surface_as_far_as_its_gradient_says() {

@@ -6,6 +6,7 @@ use crate::camera::{AutoView, Camera, FitLens, Lens, fit};
 use crate::light::{Directional, Disk, Environment, Light, LightSet, Map, PointLight, Rect, SphereLight};
 use crate::math::{Bounds, Frame, Rgb, Vec3, cast};
 use crate::medium::{ClipShape, Medium, MediumSettings};
+use crate::message::excerpt;
 use crate::scattering::{Abc, Brdf, HenyeyGreenstein, Phase, Schlick};
 use crate::transfer::{Optics, PRESETS, Point, Preset, TransferFunction};
 use crate::volume::{Space, Volume};
@@ -89,7 +90,7 @@ fn transfer(document: &Document, volume: &Volume) -> Result<TransferFunction, Sc
     } else if let Some(name) = given.and_then(|t| t.preset.as_ref()) {
         let preset = Preset::named(name).ok_or_else(|| {
             let known = PRESETS.map(|p| p.name).join(", ");
-            fault("transfer_function.preset", format!("no preset `{name}`; there are {known}"))
+            fault("transfer_function.preset", format!("no preset `{}`; there are {known}", excerpt(name)))
         })?;
         preset.points(volume)
     } else {
@@ -168,7 +169,10 @@ fn light(light: &document::Light, world_up: Vec3, assets: &Assets) -> Result<Lig
         document::Light::Environment { radiance, map, rotation, visible, .. } => {
             Light::Environment(match (radiance, map) {
                 (_, Some(path)) => {
-                    let map = assets.maps.get(path).ok_or_else(|| format!("the map `{path}` is missing"))?;
+                    let map = assets
+                        .maps
+                        .get(path)
+                        .ok_or_else(|| format!("the map `{}` is missing", excerpt(path)))?;
                     Environment::map(map.clone(), world_up, *rotation, *visible)
                 }
                 (radiance, None) => Environment::constant(radiance.map_or(Rgb::BLACK, Rgb::from), *visible),

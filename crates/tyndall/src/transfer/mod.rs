@@ -1,14 +1,17 @@
 //! The transfer function: what a data value looks like to light.
 //!
 //! Piecewise linear between points, clamped outside them; two points at one value are a jump, of
-//! which the later holds from there. It is evaluated exactly, segment by segment, so there is no
-//! table whose error would have to be bounded; a small index finds the segment in constant time.
+//! which the later holds from there. All optics are evaluated segment by segment, which a small index finds in
+//! constant time; the opacity alone, which is read most, also from a table that agrees with them but for rounding.
 
 mod presets;
+mod table;
 
 pub use presets::{PRESETS, Preset};
 
 use crate::math::{Rgb, cast};
+use crate::simd::Lanes;
+use table::OpacityTable;
 
 /// The optics of matter at one data value.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,6 +95,7 @@ pub struct TransferFunction {
     /// Per bin over the points' span: the last point at or below the bin's lower end.
     segments: Vec<u32>,
     bins_per_value: f32,
+    opacities: OpacityTable,
 }
 
 /// Bins of the segment index.
@@ -119,7 +123,7 @@ impl TransferFunction {
             .map(|bin| points.partition_point(|p| p.value <= lower_end(bin.saturating_sub(1))))
             .map(|after| cast::fit_u32(after.saturating_sub(1)))
             .collect();
-        Ok(Self { points, segments, bins_per_value })
+        Ok(Self { opacities: OpacityTable::new(&points), points, segments, bins_per_value })
     }
 
     /// The points, ascending.
@@ -131,6 +135,9 @@ impl TransferFunction {
     /// The segment that holds `value`: its two points and the place between them.
     #[inline]
     fn locate(&self, value: f32) -> (&Point, &Point, f32) {
+        if value < self.points[0].value {
+            return (&self.points[0], &self.points[0], 0.0);
+        }
         let bin = cast::index((value - self.points[0].value) * self.bins_per_value).min(BINS);
         let mut i = self.segments[bin] as usize;
         while i + 1 < self.points.len() && self.points[i + 1].value <= value {
@@ -155,17 +162,29 @@ impl TransferFunction {
     #[inline]
     #[must_use]
     pub fn opacity(&self, value: f32) -> f32 {
+        self.opacities.opacity(value).unwrap_or_else(|| self.exact_opacity(value))
+    }
+
+    /// Opacity by the points alone.
+    fn exact_opacity(&self, value: f32) -> f32 {
         let (a, b, t) = self.locate(value);
         a.optics.opacity + (b.optics.opacity - a.optics.opacity) * t
     }
 
-    /// Smallest and largest of a quantity over data values `[lo, hi]`; exact, since a piecewise linear
-    /// quantity has its extremes at the ends or at points.
-    fn extremes(&self, [lo, hi]: [f32; 2], quantity: impl Fn(&Optics) -> f32) -> [f32; 2] {
-        let ends = [quantity(&self.optics(lo)), quantity(&self.optics(hi))];
+    /// [`Self::opacity`] of a value per lane.
+    #[inline(always)]
+    pub(crate) fn opacity_lanes<S: Lanes>(&self, simd: S, values: S::f32s) -> S::f32s {
+        self.opacities.opacities(simd, values, |value| self.exact_opacity(value))
+    }
+
+    /// Smallest and largest of a quantity over data values `[lo, hi]`, given what it is at these ends; exact, since a
+    /// piecewise linear quantity has its extremes at the ends or at points between them.
+    fn extremes(&self, [lo, hi]: [f32; 2], ends: [f32; 2], quantity: impl Fn(&Optics) -> f32) -> [f32; 2] {
         let mut range = [ends[0].min(ends[1]), ends[0].max(ends[1])];
-        let first = self.points.partition_point(|p| p.value < lo);
-        for point in self.points[first..].iter().take_while(|p| p.value <= hi) {
+        // Points that the table cannot tell from an end count as on its far side, as they do in a look-up.
+        let place = |value| self.opacities.place(value);
+        let first = self.points.partition_point(|p| p.value <= lo || place(p.value) <= place(lo));
+        for point in self.points[first..].iter().take_while(|p| place(p.value) <= place(hi)) {
             let x = quantity(&point.optics);
             range = [range[0].min(x), range[1].max(x)];
         }
@@ -175,7 +194,7 @@ impl TransferFunction {
     /// Smallest and largest opacity over data values `[lo, hi]`.
     #[must_use]
     pub fn opacity_range(&self, values: [f32; 2]) -> [f32; 2] {
-        self.extremes(values, |o| o.opacity)
+        self.extremes(values, values.map(|v| self.opacity(v)), |o| o.opacity)
     }
 
     /// An upper bound of the luminance that matter with values in `[lo, hi]` emits per unit length at
@@ -183,7 +202,8 @@ impl TransferFunction {
     #[must_use]
     pub fn emission_bound(&self, values: [f32; 2]) -> f32 {
         let [_, opacity] = self.opacity_range(values);
-        let most = |f: fn(&Optics) -> f32| self.extremes(values, f)[1];
+        let ends = values.map(|v| self.optics(v));
+        let most = |f: fn(&Optics) -> f32| self.extremes(values, [f(&ends[0]), f(&ends[1])], f)[1];
         let channel = [
             most(|o| 1.0 - o.albedo.r) * most(|o| o.emission.r),
             most(|o| 1.0 - o.albedo.g) * most(|o| o.emission.g),
@@ -229,9 +249,8 @@ mod tests {
         let exactly_at_points = points.iter().map(|p| p.value);
         let between = (0..20_000).map(|i| -1100.0 + i as f32 * 0.21);
         for v in exactly_at_points.chain(between) {
-            let (found, expected) = (function.opacity(v), by_definition(&points, v));
+            let (found, expected) = (function.optics(v).opacity, by_definition(&points, v));
             assert!((found - expected).abs() < 1e-5, "{found}, expected {expected} at {v}");
-            assert_eq!(function.optics(v).opacity, found);
         }
     }
 
@@ -245,9 +264,13 @@ mod tests {
         ])
         .unwrap();
         assert_eq!(jump.opacity(1.0), 1.0);
-        assert_eq!(jump.opacity(1.0_f32.next_down()), 0.0);
+        assert_eq!(jump.optics(1.0_f32.next_down()).opacity, 0.0);
+        assert_eq!(jump.opacity(1.0 - 1e-6), 0.0);
         assert_eq!(jump.opacity_range([0.2, 0.9]), [0.0, 0.0]);
         assert_eq!(jump.opacity_range([0.2, 1.0]), [0.0, 1.0]);
+        // What a jump at the upper end leaves behind is still met below it.
+        let falls = vec![point(0.0, 0.1, 0.0), point(1.0, 0.7, 0.0), point(1.0, 0.2, 0.0)];
+        assert_eq!(TransferFunction::new(falls).unwrap().opacity_range([0.0, 1.0]), [0.1, 0.7]);
         let one = TransferFunction::new(vec![point(5.0, 0.3, 0.0)]).unwrap();
         assert_eq!((one.opacity(-1e30), one.opacity(5.0), one.opacity(f32::MAX)), (0.3, 0.3, 0.3));
     }

@@ -4,23 +4,34 @@
 //! between voxel centres (or nearest), and clamped to the edge value in the half voxel around them.
 
 mod bricks;
+mod cells;
 mod grid;
-mod interpolation;
+mod lanes;
 mod statistics;
 mod voxels;
 
 pub mod procedural;
 
 pub use bricks::Bricks;
+pub use cells::Cells;
 pub use grid::{Grid, GridError, Space};
-pub use interpolation::Interpolation;
 pub use statistics::Histogram;
 pub use voxels::{Voxel, Voxels};
 
 use crate::math::{Vec3, cast};
-use interpolation::Lattice;
+use bricks::Lattice;
 use std::sync::Arc;
 use voxels::with_voxels;
+
+/// How the field is read between voxel centres.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Interpolation {
+    /// Trilinear.
+    #[default]
+    Linear,
+    /// The value of the nearest centre.
+    Nearest,
+}
 
 /// `value = slope * stored + intercept`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,21 +80,21 @@ pub enum VolumeError {
 #[derive(Clone, Debug)]
 pub struct Volume {
     grid: Grid,
-    voxels: Arc<Voxels>,
+    bricks: Arc<Bricks>,
     values: ValueMap,
     interpolation: Interpolation,
     value_range: [f64; 2],
     robust_range: [f64; 2],
     non_finite: u64,
-    bricks: Arc<Bricks>,
+    cells: Arc<Cells>,
     lattice: Lattice,
     slope: f32,
     intercept: f32,
 }
 
 impl Volume {
-    /// Takes the samples over, replaces what is not finite (see [`Self::non_finite`]), and derives
-    /// the ranges and the bricks, in parallel on the current thread pool.
+    /// Cuts the samples into bricks, replaces what is not finite (see [`Self::non_finite`]), and derives
+    /// the ranges, in parallel on the current thread pool.
     ///
     /// # Errors
     /// [`VolumeError`] if the number of samples, the slope or the intercept cannot be.
@@ -102,17 +113,17 @@ impl Volume {
         let non_finite = voxels.mend_non_finite(slope);
         let value_range = statistics::value_range(&voxels, values);
         let robust_range = statistics::robust_range(&voxels, values, value_range);
-        let bricks = Bricks::new(&grid, &voxels, values, Bricks::CELL);
+        let (bricks, ranges) = Bricks::new(grid.dims(), &voxels);
         Ok(Self {
-            lattice: Lattice::new(grid.dims()),
+            lattice: bricks.lattice(),
+            cells: Arc::new(Cells::of_bricks(&bricks, &ranges, values)),
+            bricks: Arc::new(bricks),
             grid,
-            voxels: Arc::new(voxels),
             values,
             interpolation: Interpolation::Linear,
             value_range,
             robust_range,
             non_finite,
-            bricks: Arc::new(bricks),
             slope: cast::single(slope),
             intercept: cast::single(intercept),
         })
@@ -137,10 +148,22 @@ impl Volume {
         &self.grid
     }
 
-    /// The stored samples.
+    /// The stored samples as the renderer reads them.
     #[must_use]
-    pub fn voxels(&self) -> &Voxels {
-        &self.voxels
+    pub fn bricks(&self) -> &Bricks {
+        &self.bricks
+    }
+
+    /// A copy of the stored samples in the file's order, x fastest.
+    #[must_use]
+    pub fn voxels(&self) -> Voxels {
+        self.bricks.to_linear()
+    }
+
+    /// The sample type's short name, see [`Voxels::type_name`].
+    #[must_use]
+    pub fn type_name(&self) -> &'static str {
+        self.bricks.samples().type_name()
     }
 
     /// Slope and intercept.
@@ -168,25 +191,25 @@ impl Volume {
         self.non_finite
     }
 
-    /// Smallest and largest value per cell of [`Bricks::CELL`] voxels.
+    /// Smallest and largest value per cell of [`Cells::EDGE`] voxels.
     #[must_use]
-    pub fn bricks(&self) -> &Bricks {
-        &self.bricks
+    pub fn cells(&self) -> &Cells {
+        &self.cells
     }
 
-    /// Bricks of another cell size; `0` is one cell around everything.
+    /// Cells of another size; `0` is one cell around everything.
     #[must_use]
-    pub fn bricks_of(&self, cell: usize) -> Arc<Bricks> {
-        if cell == Bricks::CELL {
-            return self.bricks.clone();
+    pub fn cells_of(&self, edge: usize) -> Arc<Cells> {
+        if edge == Cells::EDGE {
+            return self.cells.clone();
         }
-        Arc::new(Bricks::new(&self.grid, &self.voxels, self.values, cell))
+        Arc::new(Cells::new(&self.grid, &self.bricks, self.values, edge))
     }
 
     /// Counts of the data values in equal bins over `range`; values outside count in the end bins.
     #[must_use]
     pub fn histogram(&self, range: [f64; 2], bins: usize) -> Histogram {
-        Histogram::new(&self.voxels, self.values, range, bins)
+        Histogram::new(&self.bricks, self.values, range, bins)
     }
 
     /// The data value at a voxel.
@@ -194,20 +217,17 @@ impl Volume {
     /// # Panics
     /// If the voxel is outside the grid.
     #[must_use]
-    pub fn voxel(&self, [x, y, z]: [usize; 3]) -> f64 {
-        let [nx, ny, nz] = self.grid.dims();
-        assert!(x < nx && y < ny && z < nz, "voxel ({x}, {y}, {z}) outside {nx} x {ny} x {nz}");
-        self.values.apply(self.voxels.get(x + nx * (y + ny * z)))
+    pub fn voxel(&self, place: [usize; 3]) -> f64 {
+        self.values.apply(self.bricks.get(place))
     }
 
     /// The data value at a point of index space, clamped to the edge outside.
     #[inline]
     #[must_use]
     pub fn value(&self, p: Vec3) -> f32 {
-        let stored = match self.interpolation {
-            Interpolation::Linear => with_voxels!(&*self.voxels, data => self.lattice.linear(data, p)),
-            Interpolation::Nearest => with_voxels!(&*self.voxels, data => self.lattice.nearest(data, p)),
-        };
+        let stored = with_voxels!(self.bricks.samples(), samples => {
+            self.lattice.read(samples, p, self.interpolation)
+        });
         self.slope * stored + self.intercept
     }
 

@@ -1,7 +1,7 @@
 //! What the samples tell as a whole: ranges and histogram.
 
 use super::voxels::with_voxels;
-use super::{ValueMap, Voxel, Voxels};
+use super::{Bricks, ValueMap, Voxel, Voxels};
 use crate::math::cast;
 use rayon::prelude::*;
 
@@ -20,24 +20,14 @@ pub struct Histogram {
 impl Histogram {
     /// # Panics
     /// If `bins` is zero.
-    pub(super) fn new(voxels: &Voxels, values: ValueMap, range: [f64; 2], bins: usize) -> Self {
+    pub(super) fn new(bricks: &Bricks, values: ValueMap, range: [f64; 2], bins: usize) -> Self {
         assert!(bins > 0, "a histogram needs a bin");
         let scale = if range[1] > range[0] { bins as f64 / (range[1] - range[0]) } else { 0.0 };
         let bin = |stored: f64| {
             let x = (values.apply(stored) - range[0]) * scale;
             cast::index(cast::single(x.clamp(0.0, bins as f64))).min(bins - 1)
         };
-        let count = |piece: &mut dyn Iterator<Item = f64>| {
-            let mut counts = vec![0_u64; bins];
-            for stored in piece {
-                counts[bin(stored)] += 1;
-            }
-            counts
-        };
-        let counts = with_voxels!(voxels, data => data
-            .par_chunks(PIECE)
-            .map(|piece| count(&mut piece.iter().map(|v| v.to_f64())))
-            .reduce(|| vec![0; bins], add));
+        let counts = bricks.fold(|| vec![0_u64; bins], |counts, stored| counts[bin(stored)] += 1, add);
         Self { range, counts }
     }
 
@@ -120,11 +110,12 @@ mod tests {
 
     #[test]
     fn counts_add_up_and_quantiles_follow() {
-        let voxels = Voxels::U16((0..1000).collect());
-        let h = Histogram::new(&voxels, ValueMap::IDENTITY, [0.0, 1000.0], 10);
+        let (thousand, _) = Bricks::new([1000, 1, 1], &Voxels::U16((0..1000).collect()));
+        let h = Histogram::new(&thousand, ValueMap::IDENTITY, [0.0, 1000.0], 10);
         assert_eq!(h.counts, vec![100; 10]);
         assert!((h.quantile(0.25) - 250.0).abs() < 1e-9);
-        let flat = Histogram::new(&Voxels::U8(vec![4; 3]), ValueMap::IDENTITY, [4.0, 4.0], 4);
+        let (three, _) = Bricks::new([1, 3, 1], &Voxels::U8(vec![4; 3]));
+        let flat = Histogram::new(&three, ValueMap::IDENTITY, [4.0, 4.0], 4);
         assert_eq!(flat.counts, vec![3, 0, 0, 0]);
     }
 }

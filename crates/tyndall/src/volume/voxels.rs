@@ -34,7 +34,7 @@ macro_rules! with_voxels {
 pub(crate) use with_voxels;
 
 /// A sample type.
-pub trait Voxel: Copy + Send + Sync + PartialOrd {
+pub trait Voxel: Copy + Default + Send + Sync + PartialOrd {
     /// As a single-precision number; wide types round to nearest.
     fn to_f32(self) -> f32;
     /// As a double-precision number, exactly.

@@ -1,11 +1,15 @@
 //! What matter covers, how far away it is, and what shows behind it.
 
 use crate::scenes::{Setup, blocks, mean, slab, trace};
+use std::sync::Arc;
 use tyndall::film::PixelSample;
-use tyndall::integrator::{Path, RayMarch};
+use tyndall::integrator::RayMarch;
 use tyndall::math::{Ray, Rgb, Vec3};
 use tyndall::scattering::Phase;
+use tyndall::scene::IntegratorKind;
 use tyndall::scene::{Background, Scene};
+use tyndall::session::{Budget, Session};
+use tyndall::simd::Level;
 use tyndall::transfer::{Optics, Point};
 
 /// A bright wall behind conservative matter that no light falls on.
@@ -34,7 +38,8 @@ fn alpha_depth_and_background_have_closed_forms() {
         let inside = (1.0 - through * (1.0 + tau)) / sigma;
         let expected = [3.0 * through, 1.0 - through, cos * (2.0 * (1.0 - through) + inside)];
         // The slab's voxel is wide: steps count in its cube root.
-        let march = RayMarch::new(&scene, 1e-3 / 1e5_f32.powf(2.0 / 3.0), 1).march(&scene, &ray);
+        let march =
+            RayMarch::new(&scene, 1e-3 / 1e5_f32.powf(2.0 / 3.0), 1, Level::best()).march(&scene, &ray);
         for ((name, pick), expected) in PARTS.into_iter().zip(expected) {
             let marched = f64::from(pick(&march));
             assert!(
@@ -55,12 +60,17 @@ fn a_pixel_is_covered_as_far_as_matter_fills_it() {
     let points = vec![Point { value: 0.0, optics: nothing }, Point { value: 1.0, optics: Optics::default() }];
     let half = blocks([64; 3], [2.0; 3], |p| f32::from(u8::from(p[0] < 40)));
     let scene = Setup::new(half, points, 1e4).scene();
-    let march = RayMarch::new(&scene, 0.5, 1);
-    let covered = |sample: &dyn Fn(u32) -> PixelSample| {
-        (0..4096).map(|i| f64::from(sample(i).alpha)).sum::<f64>() / 4096.0
+    let covered = |integrator| {
+        let mut scene = scene.clone();
+        scene.size = [1, 1];
+        scene.render.integrator = integrator;
+        let threads = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap());
+        let mut session = Session::new(scene, threads);
+        session.refine(&Budget::samples(4096));
+        session.image().rgba[0][3]
     };
-    let walked = covered(&|i| Path.sample(&scene, [0, 0], i));
-    let marched = covered(&|i| march.sample(&scene, [0, 0], i));
+    let walked = covered(IntegratorKind::Path);
+    let marched = covered(IntegratorKind::RayMarch { step: 0.5, light_samples: 1 });
     for share in [walked, marched] {
         assert!((share - 0.75).abs() < 2e-3, "{share} of the pixel");
     }

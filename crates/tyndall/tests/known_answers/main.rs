@@ -11,6 +11,7 @@
 mod coverage;
 mod emission;
 mod furnace;
+mod levels;
 mod lights;
 mod scenes;
 mod semi_infinite;

@@ -11,6 +11,7 @@ use tyndall::medium::{ClipShape, Medium, MediumSettings};
 use tyndall::sampling::{PathSampler, Stream};
 use tyndall::scattering::{Brdf, HenyeyGreenstein, Phase};
 use tyndall::scene::{Background, IntegratorKind, RenderSettings, Scene};
+use tyndall::simd::Level;
 use tyndall::transfer::{Optics, Point, TransferFunction};
 use tyndall::volume::{Grid, Interpolation, ValueMap, Volume, Voxels};
 use tyndall_testing::Mean;
@@ -128,5 +129,5 @@ pub fn radiance(scene: &Scene, paths: u32, ray: impl Fn(&mut Stream) -> Ray + Sy
 }
 
 pub fn trace(scene: &Scene, ray: Ray, numbers: &mut PathSampler) -> PixelSample {
-    Path::trace(scene, ray, numbers)
+    Path::new(Level::best()).trace(scene, ray, numbers.clone())
 }

@@ -16,6 +16,7 @@ use std::ffi::OsString;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
+use tyndall::message::place;
 use tyndall::volume::ValueMap;
 
 /// Reads a `.nii`, `.hdr` or `.img` file, or one of these compressed with gzip.
@@ -132,6 +133,6 @@ fn beside(path: &Path, extension: &str) -> Result<PathBuf, ReadError> {
             return Ok(candidate);
         }
     }
-    let expected = format!("{}.{extension} or .{extension}.gz beside it", stem.display());
+    let expected = format!("{}.{extension} or .{extension}.gz beside it", place(&stem));
     Err(ReadError::missing(path, "the other file of the pair", &expected))
 }

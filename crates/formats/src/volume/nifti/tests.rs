@@ -60,7 +60,7 @@ fn both_byte_orders_and_gzip_give_the_same() {
         for (name, bytes) in [("a.nii", plain), ("a.nii.gz", encoder.finish().unwrap())] {
             let (_folder, path) = folder_with(name, &bytes);
             let Loaded { volume, notes, .. } = read(&path).unwrap();
-            assert_eq!(*volume.voxels(), Voxels::I16(vec![1, -2, 300, -400, 5, 6]));
+            assert_eq!(volume.voxels(), Voxels::I16(vec![1, -2, 300, -400, 5, 6]));
             assert_eq!(volume.value_map(), ValueMap { slope: 0.5, intercept: -7.0 });
             assert_eq!(volume.grid().spacing(), [2.0, 3.0, 4.0]);
             assert_eq!(volume.grid().origin(), [-10.0, -20.0, 30.0]);
@@ -136,7 +136,7 @@ fn a_slope_of_zero_scales_nothing_and_colours_give_their_red() {
     let loaded = load(&w).unwrap();
     assert_eq!((loaded.channels, loaded.times), (3, 1));
     let bytes = samples(false);
-    assert_eq!(*loaded.volume.voxels(), Voxels::U8(vec![bytes[0], bytes[3], bytes[6], bytes[9]]));
+    assert_eq!(loaded.volume.voxels(), Voxels::U8(vec![bytes[0], bytes[3], bytes[6], bytes[9]]));
 }
 
 #[test]

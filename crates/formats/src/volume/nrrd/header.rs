@@ -39,7 +39,7 @@ pub(super) fn read<'a>(path: &'a Path, reader: &mut dyn BufRead) -> Result<Heade
         };
         fields.insert(key, value);
         let value = value.trim();
-        if fields.get(&["data file"]) == Some(value) && (value == "LIST" || value.starts_with("LIST ")) {
+        if Fields::same(key, "data file") && (value == "LIST" || value.starts_with("LIST ")) {
             while let Some(name) = lines.next_line()? {
                 if !name.trim().is_empty() {
                     listed.push(name.trim().to_string());

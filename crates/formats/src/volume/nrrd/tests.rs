@@ -51,7 +51,7 @@ fn every_encoding_gives_the_same_samples() {
             bytes.splice(0..0, b"NRRD0005\r\n".iter().copied());
         }
         let (_folder, path) = folder_with("a.nrrd", &bytes);
-        assert_eq!(*read(&path).unwrap().volume.voxels(), expected, "{encoding}");
+        assert_eq!(read(&path).unwrap().volume.voxels(), expected, "{encoding}");
     }
 }
 
@@ -86,12 +86,12 @@ fn of_channels_and_times_the_first_is_read() {
     let rgb = "type: uchar\ndimension: 4\nsizes: 3 2 2 2\nencoding: raw\nspace: LPS\nkinds: RGB-color domain domain domain\n\
                space directions: none (1,0,0) (0,1,0) (0,0,5)";
     let loaded = load(rgb, &data).unwrap();
-    assert_eq!(*loaded.volume.voxels(), Voxels::U8((0..8).map(|v| 3 * v).collect()));
+    assert_eq!(loaded.volume.voxels(), Voxels::U8((0..8).map(|v| 3 * v).collect()));
     assert_eq!((loaded.channels, loaded.times, loaded.notes.len()), (3, 1, 1));
     assert_eq!(loaded.volume.grid().spacing(), [1.0, 1.0, 5.0]);
     let series = "type: uchar\ndimension: 4\nsizes: 2 2 2 3\nencoding: raw\nspacings: 1 2 3 0.5";
     let loaded = load(series, &data).unwrap();
-    assert_eq!(*loaded.volume.voxels(), Voxels::U8((0..8).collect()));
+    assert_eq!(loaded.volume.voxels(), Voxels::U8((0..8).collect()));
     assert_eq!((loaded.channels, loaded.times), (1, 3));
     assert_eq!(loaded.volume.grid().spacing(), [1.0, 2.0, 3.0]);
 }
@@ -118,7 +118,7 @@ fn samples_may_lie_in_one_or_many_files_beside_the_header() {
     }
     for files in ["all", "p%02d 5 7 2", "LIST\np05\np07\n", "LIST 3\np05\np07"] {
         std::fs::write(&path, format!("{header}{files}")).unwrap();
-        assert_eq!(*read(&path).unwrap().volume.voxels(), Voxels::U8((0..8).collect()), "{files}");
+        assert_eq!(read(&path).unwrap().volume.voxels(), Voxels::U8((0..8).collect()), "{files}");
     }
     for files in ["none", "p%02d 5 7 1", "LIST", "LIST\nall\np05\np07", "p05"] {
         std::fs::write(&path, format!("{header}{files}")).unwrap();
@@ -155,7 +155,7 @@ fn a_header_that_lies_costs_nothing_and_a_bomb_stops() {
     let vast = "type: uchar\ndimension: 3\nsizes: 16777216 16777216 8\nencoding: ";
     assert!(matches!(load(&format!("{vast}raw"), &[1]), Err(ReadError::Short { found: 1, .. })));
     let refused = load(&format!("{vast}gzip"), &gzip(&[1]));
-    assert!(matches!(refused, Err(ReadError::Memory { .. } | ReadError::Short { found: 1, .. })));
+    assert!(matches!(refused, Err(ReadError::Damaged { .. })));
     let bomb = gzip(&vec![0; 1 << 22]);
     let loaded = load("type: uchar\ndimension: 1\nsizes: 9\nencoding: gzip", &bomb).unwrap();
     assert_eq!(loaded.volume.grid().dims(), [9, 1, 1]);

@@ -7,9 +7,10 @@ use serde_json::{Map, Number, Value};
 
 use super::advice::{unknown_key, unknown_word};
 use super::describe::{describe, length};
-use super::error::{DocumentError, Problem, Problems, describe_value, excerpt, join};
+use super::error::{DocumentError, Problem, Problems, describe_value, join};
 use super::node::{Node, TAG};
 use crate::math::cast;
+use crate::message::quoted;
 
 /// Checks `document`; a grey becomes a colour, 3.0 becomes 3 where a whole number belongs, and a type left to its
 /// default is named.
@@ -144,7 +145,7 @@ impl Check {
                 self.report(path, "an empty text", describe(node));
             }
         } else if !words.contains(&text) {
-            let problem = Problem::new(path, format!("{:?}", excerpt(text)), describe(node));
+            let problem = Problem::new(path, quoted(text), describe(node));
             self.problems.push(Problem { mend: unknown_word(text, &words), ..problem });
         }
     }
@@ -159,6 +160,10 @@ impl Check {
             && bound("maximum").is_none_or(|high| x <= high)
             && bound("exclusiveMinimum").is_none_or(|low| x > low)
             && bound("exclusiveMaximum").is_none_or(|high| x < high);
+        // The zero that a range from 0 lets in has no sign: the renderer divides by densities.
+        if x == 0.0 && x.is_sign_negative() {
+            *number = Number::from_f64(0.0).unwrap_or_else(|| number.clone());
+        }
         let is_whole = node.keyword("type").is_some_and(|kind| kind == "integer");
         if is_whole && let Some(whole) = whole(number) {
             *number = whole;

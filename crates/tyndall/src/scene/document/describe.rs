@@ -109,7 +109,7 @@ mod tests {
             ("camera.fov", "a number between 0 and 180, ends excluded"),
             (
                 "film.background",
-                "\"environment\" or \"transparent\" or a number of at least 0 or a list of 3 numbers of at least 0",
+                "\"environment\" or \"transparent\" or a number from 0 to 1e+18 or a list of 3 numbers from 0 to 1e+18",
             ),
             ("film.size", "a list of 2 whole numbers of at least 1"),
         ] {

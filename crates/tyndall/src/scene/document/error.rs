@@ -5,6 +5,8 @@ use std::fmt;
 use serde_json::Value;
 use thiserror::Error;
 
+use crate::message::{excerpt, quoted};
+
 /// A document that does not describe a scene.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum DocumentError {
@@ -132,22 +134,13 @@ pub(super) fn join(path: &str, key: impl fmt::Display) -> String {
     if path.is_empty() { key } else { format!("{path}.{key}") }
 }
 
-/// The text, shortened where a message would drown in it.
-pub(super) fn excerpt(text: &str) -> String {
-    const LONGEST: usize = 60;
-    if text.chars().nth(LONGEST).is_none() {
-        return text.to_owned();
-    }
-    text.chars().take(LONGEST).chain("...".chars()).collect()
-}
-
 /// A value as an error names it.
 pub(super) fn describe_value(value: &Value) -> String {
     match value {
         Value::Null => "null".to_owned(),
         Value::Bool(flag) => flag.to_string(),
         Value::Number(number) => number.to_string(),
-        Value::String(text) => format!("{:?}", excerpt(text)),
+        Value::String(text) => quoted(text),
         Value::Array(items) => format!("a list of {}", items.len()),
         Value::Object(_) => "a table".to_owned(),
     }

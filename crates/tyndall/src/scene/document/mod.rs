@@ -54,6 +54,7 @@ pub use text::{value_from_json, value_from_toml};
 pub use transfer::{TransferFunction, TransferPoint};
 pub use volume::{DataType, Endian, FieldKind, Interpolation, Procedural, Raw, Volume};
 
+use crate::message::sentence;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -124,7 +125,11 @@ impl Document {
     pub fn from_value(mut value: Value) -> Result<Self, DocumentError> {
         check::check(&mut value)?;
         let document: Self = serde_json::from_value(value).map_err(|error| {
-            DocumentError::one(Problem::new("", error.to_string(), "a document as the schema describes it"))
+            DocumentError::one(Problem::new(
+                "",
+                sentence(&error.to_string()),
+                "a document as the schema describes it",
+            ))
         })?;
         validate::validate(&document)?;
         Ok(document)

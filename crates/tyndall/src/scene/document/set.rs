@@ -2,9 +2,10 @@
 
 use serde_json::{Map, Value};
 
-use super::error::{DocumentError, Problem, describe_value, excerpt, join};
+use super::error::{DocumentError, Problem, describe_value, join};
 use super::node::Node;
 use super::patch::{make_way, merge};
+use crate::message::{excerpt, quoted};
 
 /// Sets one key of a document: `medium.density=0.3`, `lights.0.radiance=[1,2,3]`.
 ///
@@ -20,8 +21,7 @@ pub fn set(document: &mut Value, assignment: &str) -> Result<(), DocumentError> 
     const LONGEST: usize = 16;
 
     let expected = "PATH=VALUE, such as medium.density=0.3";
-    let malformed =
-        |found: &str| DocumentError::one(Problem::new("", format!("{:?}", excerpt(found)), expected));
+    let malformed = |found: &str| DocumentError::one(Problem::new("", quoted(found), expected));
     let (path, text) = assignment.split_once('=').ok_or_else(|| malformed(assignment))?;
     let parts: Vec<_> = path.trim().split('.').collect();
     if parts.len() > LONGEST || parts.contains(&"") {
@@ -69,11 +69,8 @@ fn assign(
             let last = if removes { items.len().checked_sub(1) } else { Some(items.len()) };
             let index = part.parse().ok().filter(|index: &usize| last.is_some_and(|last| *index <= last));
             let Some(index) = index else {
-                let problem = Problem::new(
-                    below,
-                    format!("{:?}", excerpt(part)),
-                    format!("an index into {} items", items.len()),
-                );
+                let problem =
+                    Problem::new(below, quoted(part), format!("an index into {} items", items.len()));
                 return Err(DocumentError::one(problem.with_mend("the index after the last appends")));
             };
             if removes {
@@ -89,7 +86,7 @@ fn assign(
         scalar => Err(DocumentError::one(Problem::new(
             path,
             describe_value(scalar),
-            format!("a table or a list, to hold `{part}`"),
+            format!("a table or a list, to hold `{}`", excerpt(part)),
         ))),
     }
 }

@@ -65,13 +65,13 @@ shapes! {
         "minItems": 3,
         "maxItems": 3
     };
-    /// Linear red, green and blue of at least 0; one number is grey.
+    /// Linear red, green and blue from 0 to 1e18; one number is grey. The end is [`crate::light::BRIGHTEST`].
     Color = {
         "oneOf": [
-            { "type": "number", "format": "float", "minimum": 0 },
+            { "type": "number", "format": "float", "minimum": 0, "maximum": 1e18 },
             {
                 "type": "array",
-                "items": { "type": "number", "format": "float", "minimum": 0 },
+                "items": { "type": "number", "format": "float", "minimum": 0, "maximum": 1e18 },
                 "minItems": 3,
                 "maxItems": 3
             }

@@ -3,6 +3,7 @@
 use serde_json::{Map, Number, Value};
 
 use super::error::{DocumentError, Problem, join};
+use crate::message::sentence;
 
 /// Reads JSON.
 ///
@@ -17,7 +18,7 @@ pub fn value_from_json(text: &str) -> Result<Value, DocumentError> {
             language: "JSON",
             line: error.line(),
             column: error.column(),
-            message: message.to_owned(),
+            message: sentence(message),
         }
     })
 }
@@ -35,7 +36,7 @@ pub fn value_from_toml(text: &str) -> Result<Value, DocumentError> {
             Some((lines, rest)) => (lines.matches('\n').count() + 2, rest.chars().count() + 1),
             None => (1, before.chars().count() + 1),
         };
-        DocumentError::Syntax { language: "TOML", line, column, message: error.message().to_owned() }
+        DocumentError::Syntax { language: "TOML", line, column, message: sentence(error.message()) }
     })?;
     table_to_json(table, "")
 }

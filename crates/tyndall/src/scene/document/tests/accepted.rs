@@ -243,6 +243,22 @@ fn the_ends_of_the_ranges_are_accepted() {
     }
 }
 
+/// Rays stood still in matter of minus no density.
+#[test]
+fn a_zero_has_no_sign() {
+    for density in ["-0.0", "-0", "-1e-300", "-1e-46"] {
+        for text in [
+            format!("volume.procedural = {{}}\nmedium.density = {density}"),
+            format!("{{\"volume\": {{\"procedural\": {{}}}}, \"medium\": {{\"density\": {density}}}}}"),
+        ] {
+            let document =
+                if text.starts_with('{') { Document::from_json(&text) } else { Document::from_toml(&text) };
+            let density = document.unwrap().medium.density;
+            assert!(density == 0.0 && density.is_sign_positive(), "{text}: {density}");
+        }
+    }
+}
+
 #[test]
 fn the_check_and_the_types_agree() {
     // A value that the check passes must be one that the types read: the message of serde means that they differ.

@@ -1,0 +1,75 @@
+//! Runs that are to fail: what the program must say and do, and what it must not.
+#![allow(dead_code, reason = "each file of tests uses what it needs")]
+
+use crate::support::{Ended, Folder};
+use std::time::Duration;
+
+/// A refusal takes a few hundredths of a second, and is to take less than one; the rest is for machines that do other
+/// work besides.
+pub const LONGEST: Duration = Duration::from_secs(5);
+
+/// Memory for a refusal, in bytes.
+pub const MOST_MEMORY: u64 = 1 << 30;
+
+/// Keys of a scene that is sound as far as it goes; what is wrong is added below.
+pub const SCENE: &str = "volume.procedural = { kind = 'sphere', size = [4, 4, 4] }\nrender.samples = 1\n";
+
+/// A run that is to fail.
+pub struct Fault {
+    pub files: Vec<(&'static str, Vec<u8>)>,
+    pub arguments: Vec<&'static str>,
+    pub status: i32,
+    /// Words of the message.
+    pub says: Vec<&'static str>,
+}
+
+impl Fault {
+    /// What must be; the folder `out`, in which the program runs, must stay empty.
+    pub fn check(&self) {
+        let folder = Folder::new();
+        for (name, bytes) in &self.files {
+            folder.put(name, bytes);
+        }
+        let Ended { status, stdout, stderr, took, memory } = folder.run(&self.arguments);
+        let arguments = self.arguments.iter().map(|a| a.chars().take(200).collect::<String>());
+        let told = format!(
+            "{:?}, expected {:?}: status {status:?}\n{stderr}",
+            arguments.collect::<Vec<_>>(),
+            self.says
+        );
+        assert_eq!(status, Some(self.status), "{told}");
+        assert!(!stderr.contains("panicked"), "{told}");
+        for word in &self.says {
+            assert!(stderr.contains(word), "`{word}` is not in {told}");
+        }
+        let messages = stderr.lines().filter(|l| l.starts_with("tyndall: ") || l.starts_with("error: "));
+        assert_eq!(messages.count(), 1, "{told}");
+        assert!(stderr.len() < 1000, "{told}");
+        assert!(!stderr.contains(|c: char| c.is_control() && c != '\n'), "{told:?}");
+        assert!(took < LONGEST, "{took:?} for {told}");
+        assert!(memory < MOST_MEMORY, "{} MiB for {told}", memory >> 20);
+        assert!(stdout.is_empty(), "{told}");
+        let left: Vec<_> = std::fs::read_dir(folder.at("out")).expect("a folder").collect();
+        assert!(left.is_empty(), "{left:?} left by {told}");
+    }
+}
+
+/// The content of a file at fault: exit status 1.
+pub fn file(name: &'static str, bytes: impl Into<Vec<u8>>, says: &[&'static str]) {
+    let arguments = vec!["render", name];
+    Fault { files: vec![(&name["../".len()..], bytes.into())], arguments, status: 1, says: says.to_vec() }
+        .check();
+}
+
+/// A scene in TOML at fault, with a file of eight bytes beside it.
+pub fn toml(text: String, says: &[&'static str]) {
+    let files = vec![("scene.toml", text.into_bytes()), ("eight.raw", vec![0; 8])];
+    Fault { files, arguments: vec!["render", "../scene.toml"], status: 1, says: says.to_vec() }.check();
+}
+
+/// Options at fault beside a sound scene.
+pub fn options(options: &[&'static str], status: i32, says: &[&'static str]) {
+    let files = vec![("scene.toml", SCENE.into())];
+    let arguments = [&["render", "../scene.toml"], options].concat();
+    Fault { files, arguments, status, says: says.to_vec() }.check();
+}

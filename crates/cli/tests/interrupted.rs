@@ -1,0 +1,185 @@
+//! Runs that cannot end as they should: Ctrl-C, a full disk, a folder or a reader that takes nothing. The message says
+//! so, and nothing half-written is left behind.
+
+mod support;
+
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+use support::{Ended, Folder};
+
+const SCENE: &str = "\
+    volume.procedural = { kind = 'cloud', size = [12, 12, 12] }\n\
+    film.size = [16, 16]\n\
+    render.samples = 2\n";
+
+fn with_scene() -> Folder {
+    let folder = Folder::new();
+    folder.put("scene.toml", SCENE);
+    folder
+}
+
+/// The names in the folder in which the program ran.
+fn files_in_out(folder: &Folder) -> Vec<String> {
+    let entries = std::fs::read_dir(folder.at("out")).expect("a folder");
+    entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
+}
+
+/// Runs what must fail with status 1 and one message, which it returns.
+fn fails(mut command: Command) -> String {
+    let ended = command.stderr(Stdio::piped()).output().expect("the program runs");
+    let stderr = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert_eq!(ended.status.code(), Some(1), "{stderr}");
+    assert!(stderr.starts_with("tyndall: ") && stderr.lines().count() == 1, "{stderr}");
+    stderr
+}
+
+/// What writes to standard output.
+const TALKERS: [&[&str]; 7] = [
+    &["schema"],
+    &["presets"],
+    &["completions", "bash"],
+    &["info", "../scene.toml"],
+    &["info", "../scene.toml", "--json"],
+    &["render", "../scene.toml", "-o", "-"],
+    &["render", "../scene.toml", "-o", "a.png", "--stats", "-"],
+];
+
+#[test]
+fn a_reader_that_goes_away_is_told() {
+    for arguments in TALKERS {
+        let folder = with_scene();
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let mut command = folder.tyndall(arguments);
+        command.stdout(writer);
+        let message = fails(command);
+        assert!(message.starts_with("tyndall: standard output: "), "{message}");
+        assert!(!files_in_out(&folder).iter().any(|name| name.contains(".part")), "{arguments:?}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_told() {
+    let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+    for arguments in TALKERS {
+        let folder = with_scene();
+        let mut command = folder.tyndall(arguments);
+        command.stdout(full());
+        let message = fails(command);
+        assert!(message.contains("standard output: No space left"), "{message}");
+    }
+    let folder = with_scene();
+    let message = fails(folder.tyndall(&["render", "../scene.toml", "-o", "a.png", "--stats", "/dev/full"]));
+    assert!(message.contains("/dev/full: statistics cannot be written: No space left"), "{message}");
+}
+
+/// A disk that is full in the middle of a picture, by a limit on the size of files.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_picture_that_does_not_fit_leaves_nothing() {
+    for kind in ["png", "jpg", "tif", "exr"] {
+        let folder = with_scene();
+        folder.put(&format!("out/a.{kind}"), "what was there before");
+        let mut command = Command::new("sh");
+        // Without the trap the system ends the program instead of refusing.
+        command.args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_tyndall")]);
+        command.args(["render", "../scene.toml", "--size", "64x64", "-o", &format!("a.{kind}")]);
+        command.current_dir(folder.at("out"));
+        let message = fails(command);
+        assert!(message.contains(&format!("a.{kind}: cannot write the picture: ")), "{message}");
+        assert_eq!(files_in_out(&folder), [format!("a.{kind}")]);
+        let left = std::fs::read(folder.at(&format!("out/a.{kind}"))).expect("a file");
+        assert_eq!(left, b"what was there before", "{kind}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_that_takes_no_files_is_told_before_the_work() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = with_scene();
+    folder.put("out/closed/keep", "");
+    let closed = folder.at("out/closed");
+    std::fs::set_permissions(&closed, PermissionsExt::from_mode(0o555)).expect("its owner may");
+    // Who may do everything writes there too; for such a user the kernel's own folder takes no files.
+    let place = if std::fs::write(closed.join("try"), "").is_ok() { "/proc" } else { "closed" };
+    for (option, name) in [("-o", "a.png"), ("--stats", "a.json")] {
+        let place = format!("{place}/{name}");
+        let arguments = ["render", "../scene.toml", "--samples", "2000000000", option, &place];
+        let Ended { status, stdout, stderr, took, memory } = folder.run(&arguments);
+        assert_eq!((status, stdout.as_slice()), (Some(2), &b""[..]), "{stderr}");
+        assert!(stderr.contains(&place) && stderr.lines().count() == 1, "{stderr}");
+        assert!(took < Duration::from_secs(5) && memory < 1 << 30, "{took:?}, {} MiB", memory >> 20);
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn statistics_go_to_devices_and_pipes() {
+    let folder = with_scene();
+    let run = |place: &str| {
+        let command = ["render", "../scene.toml", "-q", "-o", "a.png", "--stats", place];
+        let ended = folder.tyndall(&command).output().expect("the program runs");
+        assert!(
+            ended.status.success() && ended.stderr.is_empty(),
+            "{}",
+            String::from_utf8_lossy(&ended.stderr)
+        );
+        ended.stdout
+    };
+    assert!(run("/dev/null").is_empty());
+    assert!(!std::fs::metadata("/dev/null").expect("a device").is_file(), "it is a file now");
+    let told: serde_json::Value = serde_json::from_slice(&run("/dev/stdout")).expect("JSON");
+    assert_eq!(told["integrator"], "path");
+    let made = Command::new("mkfifo").arg(folder.at("out/pipe")).status().expect("mkfifo runs");
+    assert!(made.success());
+    let pipe = folder.at("out/pipe");
+    let reader = std::thread::spawn(move || std::fs::read(pipe).expect("what was written"));
+    run("pipe");
+    let told: serde_json::Value = serde_json::from_slice(&reader.join().expect("a reader")).expect("JSON");
+    assert_eq!(told["integrator"], "path");
+}
+
+#[cfg(unix)]
+fn interrupt(process: u32) {
+    let sent = Command::new("kill").args(["-INT", &process.to_string()]).status().expect("kill runs");
+    assert!(sent.success());
+}
+
+/// Ctrl-C again and again from the moment in which a picture begins to appear: it is there whole, or not at all. On a fast
+/// disk the signals may come late; the ending itself is tested beside `atomic::abandon`.
+#[cfg(unix)]
+#[test]
+fn a_picture_interrupted_while_it_is_written_is_whole_or_gone() {
+    for attempt in 0..8 {
+        let folder = with_scene();
+        folder.put("out/keep", "");
+        let arguments =
+            ["render", "../scene.toml", "--size", "1600x1600", "--samples", "1", "-q", "-o", "a.exr"];
+        let mut child =
+            folder.tyndall(&arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
+        let begun = Instant::now();
+        // The empty one that is made to see whether the folder takes files is not meant.
+        let begins = |name: &String| {
+            let about = std::fs::metadata(folder.at("out").join(name));
+            name.ends_with(".part") && about.is_ok_and(|about| about.len() > 0)
+        };
+        while !files_in_out(&folder).iter().any(begins) {
+            assert!(begun.elapsed() < Duration::from_secs(60), "no picture begins");
+            if child.try_wait().expect("a status").is_some() {
+                break;
+            }
+        }
+        for _ in 0..2 + attempt % 2 {
+            if child.try_wait().expect("a status").is_none() {
+                interrupt(child.id());
+            }
+        }
+        let status = child.wait().expect("a status").code();
+        assert!(matches!(status, Some(0 | 130)), "{status:?}");
+        let mut left = files_in_out(&folder);
+        left.retain(|name| name != "keep");
+        assert!(left.is_empty() || left == ["a.exr"], "{left:?} after {status:?}");
+    }
+}

@@ -1,0 +1,360 @@
+//! Marching: the midpoint rule on one grid of steps per track.
+//!
+//! Step `k` covers `[k step, (k + 1) step]`, the last one what is left. The grid does not depend on the transfer
+//! function, so skipping what is empty leaves every sample where it was and changes no bit. What skipping takes away is
+//! decided for each sample by the cell that it lies in.
+
+use super::{Medium, Track};
+use crate::math::cast;
+use crate::simd::{Kernel, Lanes, Level};
+use fearless_simd::prelude::*;
+
+/// Most lanes of any level.
+pub(crate) const MOST_LANES: usize = 16;
+
+/// The steps of one track.
+#[derive(Clone, Copy, Debug, Default)]
+struct Steps {
+    /// Steps of full width.
+    whole: i32,
+    /// All steps, with the last one that is not.
+    count: i32,
+    /// Width of that one, world units.
+    rest: f32,
+}
+
+impl Steps {
+    fn new(track: &Track, step: f32) -> Self {
+        let whole = cast::truncate(track.length / step).min(i32::MAX - 1);
+        let rest = (track.length - whole as f32 * step).max(0.0);
+        // A sliver of the last bit would be a step of no width.
+        Self { whole, count: whole + i32::from(rest > 1e-4 * step), rest }
+    }
+}
+
+/// The samples that a packet of tracks takes at once, one per lane.
+pub(crate) struct PacketSample<S: Lanes> {
+    /// World distance along each track.
+    pub t: S::f32s,
+    /// In index space.
+    pub place: [S::f32s; 3],
+    /// Data value.
+    pub value: S::f32s,
+    /// Optical thickness of the step; 0 in lanes that take no sample.
+    pub thickness: S::f32s,
+}
+
+impl Medium {
+    /// Optical thickness along a track by the midpoint rule with steps of `step` world units; stops where it passes
+    /// `enough`.
+    #[must_use]
+    pub fn optical_thickness(&self, level: Level, track: &Track, step: f32, enough: f32) -> f32 {
+        struct Thickness<'a>(&'a Medium, &'a Track, f32, f32);
+        impl Kernel for Thickness<'_> {
+            type Output = f32;
+
+            #[inline(always)]
+            fn run<S: Lanes>(self, simd: S) -> f32 {
+                let Self(medium, track, step, enough) = self;
+                medium.thickness_lanes(simd, track, step, enough)
+            }
+        }
+        level.run(Thickness(self, track, step, enough))
+    }
+
+    /// [`Self::optical_thickness`], many steps at once.
+    #[inline(always)]
+    pub(crate) fn thickness_lanes<S: Lanes>(&self, simd: S, track: &Track, step: f32, enough: f32) -> f32 {
+        let steps = Steps::new(track, step);
+        let mut along = Along::new(simd, self, track, steps, step);
+        let mut k = 0;
+        for cell in self.majorants.walk(track) {
+            if cell.most <= 0.0 {
+                // Up to the last step whose middle may lie in this cell; the loop below corrects it.
+                k = k.max(cast::truncate(cell.end / step - 0.5)).min(steps.count);
+            }
+            while k < steps.count && along.midpoint(k) < cell.end {
+                if cell.most > 0.0 && along.push(k) && along.take() > enough {
+                    return along.thickness();
+                }
+                k += 1;
+            }
+        }
+        if along.count > 0 { along.take() } else { along.thickness() }
+    }
+}
+
+/// A march along a packet of tracks, at most one per lane. Each lane takes the steps of its own track that may hold
+/// matter, nearest first.
+pub(crate) struct PacketMarch<'a, S: Lanes> {
+    simd: S,
+    medium: &'a Medium,
+    width: f32,
+    origin: [S::f32s; 3],
+    direction: [S::f32s; 3],
+    whole: S::i32s,
+    count: S::i32s,
+    rest: S::f32s,
+    skip: Skip<'a, S>,
+    k: S::i32s,
+    /// Steps for which every lane stays in cells that hold matter.
+    occupied: i32,
+    /// Lanes that go on.
+    pub active: S::mask32s,
+}
+
+impl<'a, S: Lanes> PacketMarch<'a, S> {
+    /// With steps of `step` world units.
+    #[inline(always)]
+    pub fn new(simd: S, medium: &'a Medium, tracks: &[Track; MOST_LANES], step: f32) -> Self {
+        let mut numbers = [[0.0; MOST_LANES]; 7];
+        let mut whole = [0; MOST_LANES];
+        let mut count = [0; MOST_LANES];
+        for (lane, track) in tracks.iter().enumerate() {
+            let steps = Steps::new(track, step);
+            let (o, d) = (track.ray.origin, track.ray.direction);
+            for (lanes, x) in numbers.iter_mut().zip([o.x, o.y, o.z, d.x, d.y, d.z, steps.rest]) {
+                lanes[lane] = x;
+            }
+            whole[lane] = steps.whole;
+            count[lane] = steps.count;
+        }
+        let [ox, oy, oz, dx, dy, dz, rest] = &numbers;
+        let origin = [load(simd, ox), load(simd, oy), load(simd, oz)];
+        let direction = [load(simd, dx), load(simd, dy), load(simd, dz)];
+        let count = S::i32s::from_slice(simd, &count[..S::WIDTH]);
+        let k = S::i32s::splat(simd, 0);
+        Self {
+            simd,
+            medium,
+            width: step,
+            origin,
+            direction,
+            whole: S::i32s::from_slice(simd, &whole[..S::WIDTH]),
+            count,
+            rest: load(simd, rest),
+            skip: Skip::new(simd, medium, origin, direction, step),
+            k,
+            occupied: 0,
+            active: k.simd_lt(count),
+        }
+    }
+
+    /// The step that each lane takes next.
+    #[inline(always)]
+    pub fn step(&self) -> S::i32s {
+        self.k
+    }
+
+    /// Goes on with certain steps.
+    #[inline(always)]
+    pub fn go_to(&mut self, k: S::i32s) {
+        self.k = k;
+        self.occupied = 0;
+        self.active = k.simd_lt(self.count);
+    }
+
+    /// The next samples of which one at least met matter.
+    #[inline(always)]
+    pub fn next(&mut self) -> Option<PacketSample<S>> {
+        let simd = self.simd;
+        let zero = S::f32s::splat(simd, 0.0);
+        while self.active.any_true() {
+            let k = self.k;
+            let width = k.simd_lt(self.whole).select(S::f32s::splat(simd, self.width), self.rest);
+            let t = k.to_float::<S::f32s>() * self.width + width * 0.5;
+            let place = at::<S>(self.origin, self.direction, t);
+            let mut here = self.active;
+            self.k = k + 1;
+            if self.occupied == 0 {
+                let cells = self.skip.cells(place);
+                let leap = self.skip.leap(k, &cells);
+                here &= !cells.empty;
+                self.k = cells.empty.select(leap, self.k);
+                if (self.active & cells.empty).any_true() {
+                    if !here.any_true() {
+                        self.active &= self.k.simd_lt(self.count);
+                        continue;
+                    }
+                } else {
+                    // Lanes that have ended stay where they are for ever.
+                    let far = S::i32s::splat(simd, i32::MAX);
+                    self.occupied = least(self.active.select(leap - k, far).as_slice()) - 1;
+                }
+            } else {
+                self.occupied -= 1;
+            }
+            self.active &= self.k.simd_lt(self.count);
+            let value = self.medium.volume.value_lanes(simd, place);
+            let opacity = self.medium.transfer.opacity_lanes(simd, value);
+            let thickness = here.select(opacity * width * self.medium.density, zero);
+            if thickness.simd_gt(zero).any_true() {
+                return Some(PacketSample { t, place, value, thickness });
+            }
+        }
+        None
+    }
+}
+
+#[inline(always)]
+fn least(numbers: &[i32]) -> i32 {
+    numbers.iter().copied().fold(i32::MAX, i32::min)
+}
+
+#[inline(always)]
+fn load<S: Lanes>(simd: S, lanes: &[f32; MOST_LANES]) -> S::f32s {
+    S::f32s::from_slice(simd, &lanes[..S::WIDTH])
+}
+
+#[inline(always)]
+fn at<S: Lanes>(origin: [S::f32s; 3], direction: [S::f32s; 3], t: S::f32s) -> [S::f32s; 3] {
+    let ([ox, oy, oz], [dx, dy, dz]) = (origin, direction);
+    [dx.mul_add(t, ox), dy.mul_add(t, oy), dz.mul_add(t, oz)]
+}
+
+impl Track {
+    /// Index-space places at distances inside the medium.
+    #[inline(always)]
+    pub(super) fn lanes<S: Lanes>(&self, simd: S, t: S::f32s) -> [S::f32s; 3] {
+        let (o, d) = (self.ray.origin.to_array(), self.ray.direction.to_array());
+        let splat = [S::f32s::splat(simd, o[0]), S::f32s::splat(simd, o[1]), S::f32s::splat(simd, o[2])];
+        [t.mul_add(d[0], splat[0]), t.mul_add(d[1], splat[1]), t.mul_add(d[2], splat[2])]
+    }
+}
+
+/// Steps of one track, gathered until they fill the lanes.
+struct Along<'a, S: Lanes> {
+    simd: S,
+    medium: &'a Medium,
+    track: &'a Track,
+    steps: Steps,
+    step: f32,
+    pending: [i32; MOST_LANES],
+    count: usize,
+    thickness: S::f32s,
+}
+
+impl<'a, S: Lanes> Along<'a, S> {
+    #[inline(always)]
+    fn new(simd: S, medium: &'a Medium, track: &'a Track, steps: Steps, step: f32) -> Self {
+        let thickness = S::f32s::splat(simd, 0.0);
+        Self { simd, medium, track, steps, step, pending: [0; MOST_LANES], count: 0, thickness }
+    }
+
+    #[inline(always)]
+    fn midpoint(&self, k: i32) -> f32 {
+        let width = if k < self.steps.whole { self.step } else { self.steps.rest };
+        k as f32 * self.step + 0.5 * width
+    }
+
+    /// Whether the lanes are now full.
+    #[inline(always)]
+    fn push(&mut self, k: i32) -> bool {
+        self.pending[self.count] = k;
+        self.count += 1;
+        self.count == S::WIDTH
+    }
+
+    /// Takes the pending samples; gives the thickness so far.
+    #[inline(always)]
+    fn take(&mut self) -> f32 {
+        let simd = self.simd;
+        let k = S::i32s::from_slice(simd, &self.pending[..S::WIDTH]);
+        let whole = k.simd_lt(S::i32s::splat(simd, self.steps.whole));
+        let width = whole.select(S::f32s::splat(simd, self.step), S::f32s::splat(simd, self.steps.rest));
+        let t = k.to_float::<S::f32s>() * self.step + width * 0.5;
+        let place = self.track.lanes(simd, t);
+        let value = self.medium.volume.value_lanes(simd, place);
+        let opacity = self.medium.transfer.opacity_lanes(simd, value);
+        let number = S::f32s::from_fn(simd, |lane| lane as f32);
+        let taken = number.simd_lt(S::f32s::splat(simd, self.count as f32));
+        self.thickness += taken.select(opacity * width, S::f32s::splat(simd, 0.0));
+        self.count = 0;
+        self.thickness()
+    }
+
+    #[inline(always)]
+    fn thickness(&self) -> f32 {
+        self.thickness.as_slice().iter().sum::<f32>() * self.medium.density
+    }
+}
+
+/// Leaping over what is empty, lane by lane.
+struct Skip<'a, S: Lanes> {
+    simd: S,
+    /// See [`MajorantGrid::empty`](super::MajorantGrid::empty).
+    empty: &'a [u8],
+    dims: [i32; 3],
+    edge: f32,
+    step: f32,
+    origin: [S::f32s; 3],
+    inverse: [S::f32s; 3],
+    /// Infinite where a track never leaves along an axis, else 0.
+    never: [S::f32s; 3],
+    forward: [S::mask32s; 3],
+}
+
+/// The cells that the lanes are in.
+struct LaneCells<S: Lanes> {
+    place: [S::i32s; 3],
+    /// Whether there is no matter.
+    empty: S::mask32s,
+    /// Cells to where that ends; 0 where there is matter.
+    extent: S::i32s,
+}
+
+impl<'a, S: Lanes> Skip<'a, S> {
+    #[inline(always)]
+    fn new(simd: S, medium: &'a Medium, origin: [S::f32s; 3], direction: [S::f32s; 3], step: f32) -> Self {
+        let zero = S::f32s::splat(simd, 0.0);
+        let one = S::f32s::splat(simd, 1.0);
+        let [x, y, z] = direction;
+        let [u, v, w] = [x.simd_eq(zero), y.simd_eq(zero), z.simd_eq(zero)];
+        let far = S::f32s::splat(simd, f32::INFINITY);
+        Self {
+            simd,
+            empty: medium.majorants.empty(),
+            dims: medium.majorants.dims(),
+            edge: medium.majorants.edge(),
+            step,
+            origin,
+            inverse: [u.select(zero, one / x), v.select(zero, one / y), w.select(zero, one / z)],
+            never: [u.select(far, zero), v.select(far, zero), w.select(far, zero)],
+            forward: [x.simd_gt(zero), y.simd_gt(zero), z.simd_gt(zero)],
+        }
+    }
+
+    #[inline(always)]
+    fn cells(&self, place: [S::f32s; 3]) -> LaneCells<S> {
+        let place = [self.cell(place[0], 0), self.cell(place[1], 1), self.cell(place[2], 2)];
+        let number: S::u32s = (place[0] + (place[1] + place[2] * self.dims[1]) * self.dims[0]).bitcast();
+        let extent: S::i32s = (self.simd.words(self.empty, number) & 0xff).bitcast();
+        LaneCells { place, empty: extent.simd_gt(S::i32s::splat(self.simd, 0)), extent }
+    }
+
+    #[inline(always)]
+    fn cell(&self, x: S::f32s, axis: usize) -> S::i32s {
+        let cell: S::i32s = (x * (1.0 / self.edge)).max(0.0).to_int();
+        cell.min(S::i32s::splat(self.simd, self.dims[axis] - 1))
+    }
+
+    /// The last step whose middle surely lies where all is alike, empty or full of matter; or the next.
+    #[inline(always)]
+    fn leap(&self, k: S::i32s, cells: &LaneCells<S>) -> S::i32s {
+        let one = S::i32s::splat(self.simd, 1);
+        let extent = cells.extent.max(one);
+        let leave =
+            self.leave(0, cells, extent).min(self.leave(1, cells, extent)).min(self.leave(2, cells, extent));
+        // Past the end of every track, and far from the end of the integers.
+        let last = (leave * (1.0 / self.step) - 0.5).max(0.0).min(1e9);
+        let last: S::i32s = last.to_int();
+        last.max(k + 1)
+    }
+
+    /// Where the tracks leave what is alike along an axis.
+    #[inline(always)]
+    fn leave(&self, a: usize, cells: &LaneCells<S>, extent: S::i32s) -> S::f32s {
+        let border = cells.place[a] + self.forward[a].select(extent, -(extent - 1));
+        (border.to_float::<S::f32s>() * self.edge - self.origin[a]) * self.inverse[a] + self.never[a]
+    }
+}

@@ -1,0 +1,150 @@
+//! Reading from many places at once: the one thing here that the compiler cannot check.
+//!
+//! Every public function clamps its places to the slice, so that none can be used wrongly.
+
+use crate::math::cast;
+use fearless_simd::prelude::*;
+use fearless_simd::{Fallback, Simd};
+
+/// The lanes that kernels are written over.
+pub(crate) trait Lanes:
+    Simd<f32s: SimdFloat<Self, Bits = <Self as Simd>::u32s>, i32s: Bytes<Bytes = Self::u8s>>
+{
+    /// Four bytes from each place `base + SCALE * index`, as a little-endian word.
+    ///
+    /// # Safety
+    /// `SCALE` is 1, 2, 4 or 8, every index is below 2^31, and from every place four bytes can be read.
+    unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s;
+
+    /// Lanes of a vector.
+    const WIDTH: usize = <Self::f32s as SimdBase<Self>>::LEN;
+
+    /// Single-precision numbers; an index past the end reads the last.
+    #[inline(always)]
+    fn numbers(self, table: &[f32], index: Self::u32s) -> Self::f32s {
+        let index = self.at_most(index, table.len() - 1);
+        // SAFETY: the index is at most that of the last number, each of which has four bytes.
+        let words = unsafe { self.gather_words::<4>(table.as_ptr().cast(), index) };
+        Self::f32s::from_bits(words)
+    }
+
+    /// The words that begin at the `index`-th of numbers of `size` bytes; a word that would reach past the end is read
+    /// from the last place where it does not.
+    #[inline(always)]
+    fn words<T: bytemuck::Pod>(self, numbers: &[T], index: Self::u32s) -> Self::u32s {
+        const { assert!(matches!(size_of::<T>(), 1 | 2 | 4)) };
+        let index = self.at_most(index, numbers.len() - 4 / size_of::<T>());
+        let base = numbers.as_ptr().cast();
+        // SAFETY: the index leaves room for the numbers that make four bytes.
+        unsafe {
+            match size_of::<T>() {
+                1 => self.gather_words::<1>(base, index),
+                2 => self.gather_words::<2>(base, index),
+                _ => self.gather_words::<4>(base, index),
+            }
+        }
+    }
+
+    /// Clamps indices to a last one, below 2^31.
+    #[inline(always)]
+    fn at_most(self, index: Self::u32s, last: usize) -> Self::u32s {
+        index.min(Self::u32s::splat(self, cast::fit_u32(last.min(i32::MAX as usize))))
+    }
+}
+
+impl Lanes for Fallback {
+    #[inline(always)]
+    unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
+        // SAFETY: what the caller promises.
+        unsafe { one_by_one::<Self, SCALE>(self, base, index) }
+    }
+}
+
+#[cfg(target_arch = "aarch64")]
+impl Lanes for fearless_simd::Neon {
+    #[inline(always)]
+    unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
+        // SAFETY: what the caller promises.
+        unsafe { one_by_one::<Self, SCALE>(self, base, index) }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Lanes for fearless_simd::Avx2 {
+    #[inline(always)]
+    unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
+        // SAFETY: the token proves the instructions; the places are what the caller promises.
+        let words = unsafe { std::arch::x86_64::_mm256_i32gather_epi32::<SCALE>(base.cast(), index.into()) };
+        words.simd_into(self)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Lanes for fearless_simd::Avx512 {
+    #[inline(always)]
+    unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
+        // SAFETY: the token proves the instructions; the places are what the caller promises.
+        let words = unsafe { std::arch::x86_64::_mm512_i32gather_epi32::<SCALE>(index.into(), base.cast()) };
+        words.simd_into(self)
+    }
+}
+
+/// The gather of processors that have none.
+///
+/// # Safety
+/// As [`Lanes::gather_words`].
+#[inline(always)]
+unsafe fn one_by_one<S: Lanes, const SCALE: i32>(simd: S, base: *const u8, index: S::u32s) -> S::u32s {
+    let index = index.as_slice();
+    S::u32s::from_fn(simd, |lane| {
+        let offset = index[lane] as usize * SCALE.cast_unsigned() as usize;
+        // SAFETY: four bytes can be read there, as the caller promises, at any alignment.
+        u32::from_le_bytes(unsafe { base.add(offset).cast::<[u8; 4]>().read() })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Kernel, Level};
+    use super::*;
+
+    struct Read<'a> {
+        bytes: &'a [u8],
+        shorts: &'a [u16],
+        numbers: &'a [f32],
+        index: [u32; 16],
+    }
+
+    impl Kernel for Read<'_> {
+        type Output = Vec<(u32, u32, f32)>;
+
+        #[inline(always)]
+        fn run<S: Lanes>(self, simd: S) -> Self::Output {
+            let index = S::u32s::from_fn(simd, |lane| self.index[lane]);
+            let bytes = simd.words(self.bytes, index);
+            let shorts = simd.words(self.shorts, index);
+            let numbers = simd.numbers(self.numbers, index);
+            (0..S::WIDTH)
+                .map(|i| (bytes.as_slice()[i], shorts.as_slice()[i], numbers.as_slice()[i]))
+                .collect()
+        }
+    }
+
+    #[test]
+    fn every_level_reads_the_same_and_never_past_the_end() {
+        let bytes: Vec<u8> = (0..40).map(|i| i * 5).collect();
+        let shorts: Vec<u16> = (0..40).map(|i| i * 999).collect();
+        let numbers: Vec<f32> = (0..40_u8).map(|i| f32::from(i) * 0.5).collect();
+        let index = [0, 3, 36, 37, 39, 40, 1000, u32::MAX, 1 << 31, 5, 6, 7, 8, 9, 10, 38];
+        for level in Level::available() {
+            let read = Read { bytes: &bytes, shorts: &shorts, numbers: &numbers, index };
+            for (lane, found) in level.run(read).into_iter().enumerate() {
+                let i = index[lane] as usize;
+                let byte = |k: usize| u32::from(bytes[i.min(36) + k]) << (8 * k);
+                let word = byte(0) | byte(1) | byte(2) | byte(3);
+                let pair = u32::from(shorts[i.min(38)]) | u32::from(shorts[i.min(38) + 1]) << 16;
+                assert_eq!(found, (word, pair, numbers[i.min(39)]), "{level:?}, index {i}");
+            }
+        }
+    }
+}

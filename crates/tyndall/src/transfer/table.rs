@@ -1,0 +1,219 @@
+//! The opacity as lines in bins: constant time for one value, a few gathers for many.
+//!
+//! A bin that a single point of the function divides keeps two lines, so jumps stay jumps and, but for rounding, the table
+//! is the function. A bin of several points, or one too steep for single precision, is *rough* and sends to the function.
+
+use super::Point;
+use crate::math::cast;
+use crate::simd::Lanes;
+use fearless_simd::prelude::*;
+
+/// Bins between the first and the last point. Two more hold what is below and above them.
+const BINS: usize = 1024;
+
+/// Opacity per bin above which the rounding of a place in the bin would show, being 2^-14 of a bin at most.
+const STEEPEST: f64 = 8.0;
+
+/// See the module.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct OpacityTable {
+    /// Half the first point's value, and bins per half a unit of value: halves, whose differences never overflow.
+    first: f32,
+    bins: f32,
+    /// Where in its bin the second line begins, from 0 to 1; above that where there is one line alone, NaN in rough bins.
+    splits: Vec<f32>,
+    /// Per bin twice a line: opacity where it begins, at the bin's lower end or at the split, and its rise per bin.
+    lines: Vec<f32>,
+    any_rough: bool,
+}
+
+impl OpacityTable {
+    /// The table of points in ascending order, at least one.
+    pub(super) fn new(points: &[Point]) -> Self {
+        let (first, last) = (points[0].value, points[points.len() - 1].value);
+        let span = 0.5 * last - 0.5 * first;
+        let bins = if span > 0.0 { BINS as f32 / span } else { 1.0 };
+        let mut table =
+            Self { first: 0.5 * first, bins, splits: Vec::new(), lines: Vec::new(), any_rough: false };
+        // Of points that fall on one place the last holds from there.
+        let knots: Vec<[f64; 2]> =
+            points.iter().map(|p| [f64::from(table.place(p.value)), f64::from(p.optics.opacity)]).collect();
+        // The line after a knot, told from a place on.
+        let line = |after: usize, place: f64| -> [f64; 2] {
+            let ([x, o], next) = (knots[after], knots.get(after + 1));
+            let slope = next.filter(|n| n[0] > x).map_or(0.0, |n| (n[1] - o) / (n[0] - x));
+            [o + slope * (place - x), slope]
+        };
+        for bin in 0..BINS + 2 {
+            let lower = bin as f64;
+            let start = knots.partition_point(|k| k[0] <= lower);
+            let end = knots.partition_point(|k| k[0] < lower + 1.0);
+            let below = if start == 0 { [knots[0][1], 0.0] } else { line(start - 1, lower) };
+            let places = &knots[start..end];
+            let split = places.first().map_or(2.0, |k| k[0] - lower);
+            let above = if places.is_empty() { below } else { line(end - 1, lower + split) };
+            let one_place = places.iter().all(|k| k[0] == places[0][0]);
+            let steep = [below, above].iter().any(|l| l[1].abs() > STEEPEST);
+            let rough = !one_place || !bins.is_normal() || steep;
+            table.splits.push(if rough { f32::NAN } else { cast::single(split) });
+            table.lines.extend([below, above].as_flattened().iter().map(|&x| cast::single(x)));
+            table.any_rough |= rough;
+        }
+        table
+    }
+
+    /// The bin and the place in it of a value; it never falls as values rise.
+    #[inline]
+    pub(super) fn place(&self, value: f32) -> f32 {
+        ((value * 0.5 - self.first) * self.bins + 1.0).max(0.0).min((BINS + 1) as f32)
+    }
+
+    /// Opacity at a value; `None` in a rough bin.
+    #[inline]
+    pub(super) fn opacity(&self, value: f32) -> Option<f32> {
+        let place = self.place(value);
+        let bin = cast::index(place);
+        let within = place - bin as f32;
+        let split = self.splits[bin];
+        if split.is_nan() {
+            return None;
+        }
+        let (line, along) = if within >= split { (4 * bin + 2, within - split) } else { (4 * bin, within) };
+        Some((self.lines[line] + self.lines[line + 1] * along).clamp(0.0, 1.0))
+    }
+
+    /// Opacity at a value per lane; `exact` gives it in rough bins.
+    #[inline(always)]
+    pub(super) fn opacities<S: Lanes>(
+        &self,
+        simd: S,
+        values: S::f32s,
+        exact: impl Fn(f32) -> f32,
+    ) -> S::f32s {
+        let top = S::f32s::splat(simd, (BINS + 1) as f32);
+        // Without fused operations, so that a value falls on the same side of a jump as in `place`.
+        let place = ((values * 0.5 - self.first) * self.bins + 1.0).max(0.0).min(top);
+        let bin: S::i32s = place.to_int();
+        let within = place - bin.to_float::<S::f32s>();
+        let bin: S::u32s = bin.bitcast();
+        let split = simd.numbers(&self.splits, bin);
+        let above = within.simd_ge(split);
+        let line = (bin << 2) + above.select(S::u32s::splat(simd, 2), S::u32s::splat(simd, 0));
+        let along = above.select(within - split, within);
+        let start = simd.numbers(&self.lines, line);
+        let slope = simd.numbers(&self.lines, line + 1);
+        let mut opacities = (start + slope * along).max(0.0).min(1.0);
+        if self.any_rough && split.is_nan().any_true() {
+            for lane in 0..S::WIDTH {
+                if split.as_slice()[lane].is_nan() {
+                    opacities.as_mut_slice()[lane] = exact(values.as_slice()[lane]);
+                }
+            }
+        }
+        opacities
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Optics, TransferFunction};
+    use super::*;
+    use crate::simd::{Kernel, Level};
+    use tyndall_testing::SplitMix;
+
+    fn function(points: &[(f32, f32)]) -> TransferFunction {
+        let point = |&(value, opacity)| Point { value, optics: Optics { opacity, ..Optics::default() } };
+        TransferFunction::new(points.iter().map(point).collect()).unwrap()
+    }
+
+    fn functions() -> Vec<TransferFunction> {
+        let mut random = SplitMix::new(9);
+        // Steps of 1/8 as in 8-bit data, jumps at data values, and points too near each other for the bins.
+        let close: Vec<_> = (0..60_u8).map(|i| (1.0 + f32::from(i) * 1e-5, f32::from(i % 5) / 4.0)).collect();
+        let mut many: Vec<_> =
+            (0..300).map(|_| (cast::single(random.uniform()), cast::single(random.uniform()))).collect();
+        many.sort_by(|a, b| a.0.total_cmp(&b.0));
+        vec![
+            function(&[(5.0, 0.3)]),
+            function(&[(0.0, 0.0), (255.0, 1.0)]),
+            function(&[(0.5, 0.2), (0.5, 0.9)]),
+            function(&[(-1000.0, 0.0), (150.0, 0.0), (150.0, 0.7), (151.0, 0.1), (3000.0, 1.0)]),
+            function(&[&[(-3.0, 0.5)], &close[..], &[(7.0, 0.5)]].concat()),
+            function(&many),
+            function(&[(-3e38, 0.0), (0.0, 1.0), (3e38, 0.5)]),
+        ]
+    }
+
+    /// Values across, at and just beside the points.
+    fn values(function: &TransferFunction) -> Vec<f32> {
+        let ends = [0, function.points().len() - 1].map(|i| function.points()[i].value);
+        let middle = 0.5 * ends[0] + 0.5 * ends[1];
+        let reach = (0.6 * ends[1] - 0.6 * ends[0]).max(1.0);
+        let across = (0..20_000).map(|i| middle + reach * (i as f32 / 10_000.0 - 1.0));
+        function.points().iter().map(|p| p.value).chain(across).filter(|v| v.is_finite()).collect()
+    }
+
+    #[test]
+    fn the_table_is_the_function_but_for_rounding() {
+        for (number, function) in functions().iter().enumerate() {
+            for v in values(function) {
+                let (found, exact) = (function.opacity(v), function.optics(v).opacity);
+                assert!((found - exact).abs() < 1e-3, "{found}, exactly {exact} at {v} of function {number}");
+            }
+        }
+    }
+
+    #[test]
+    fn no_value_of_a_range_leaves_its_bounds() {
+        let mut random = SplitMix::new(3);
+        for function in functions() {
+            let values = values(&function);
+            for _ in 0..2000 {
+                let mut pick = || {
+                    values[cast::index(cast::single(random.uniform() * values.len() as f64))
+                        .min(values.len() - 1)]
+                };
+                let (a, b, t) = (pick(), pick(), cast::single(random.uniform()));
+                let [lo, hi] = [a.min(b), a.max(b)];
+                let [least, most] = function.opacity_range([lo, hi]);
+                for v in [lo, hi, (lo * (1.0 - t) + hi * t).clamp(lo, hi)] {
+                    let o = function.opacity(v);
+                    assert!(
+                        least - 1e-6 <= o && o <= most + 1e-6,
+                        "{o} at {v} outside [{least}, {most}] of [{lo}, {hi}]"
+                    );
+                }
+            }
+        }
+    }
+
+    struct Opacities<'a>(&'a TransferFunction, &'a [f32]);
+
+    impl Kernel for Opacities<'_> {
+        type Output = Vec<f32>;
+
+        #[inline(always)]
+        fn run<S: Lanes>(self, simd: S) -> Vec<f32> {
+            let of = |values: &[f32]| self.0.opacity_lanes(simd, S::f32s::from_slice(simd, values));
+            self.1.chunks_exact(S::WIDTH).flat_map(|values| of(values).as_slice().to_vec()).collect()
+        }
+    }
+
+    #[test]
+    fn every_level_gives_the_scalar_opacity() {
+        for function in functions() {
+            let mut values = values(&function);
+            values.truncate(values.len() / 16 * 16);
+            for level in Level::available() {
+                let found = level.run(Opacities(&function, &values));
+                for (&v, found) in values.iter().zip(found) {
+                    let expected = function.opacity(v);
+                    assert!(
+                        (found - expected).abs() < 1e-6,
+                        "{found}, expected {expected} at {v} with {level:?}"
+                    );
+                }
+            }
+        }
+    }
+}
