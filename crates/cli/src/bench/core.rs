@@ -1,0 +1,184 @@
+//! What the path tracer and the ray marcher stand on.
+
+use super::Row;
+use super::scenes::{Bench, cloud, ct};
+use super::timing::Effort;
+use crate::Failure;
+use serde_json::json;
+use std::time::{Duration, Instant};
+use tyndall::math::{Ray, Vec3};
+use tyndall::medium::{MajorantGrid, Medium};
+use tyndall::sampling::Stream;
+use tyndall::scene::Scene;
+use tyndall::session::{Budget, Session};
+use tyndall::simd::Level;
+
+/// Steps of all primary rays of a picture, as marching takes them.
+fn steps(scene: &Scene, step: f32) -> f64 {
+    let [width, height] = scene.size;
+    let step = step * scene.medium.volume().grid().voxel_size();
+    let mut sum = 0.0;
+    for y in 0..height {
+        for x in 0..width {
+            let ray = scene.camera.ray(scene.size, [x as f32 + 0.5, y as f32 + 0.5], [0.5; 2]);
+            sum += f64::from(scene.medium.track(&ray, f32::INFINITY).length() / step);
+        }
+    }
+    sum
+}
+
+/// Primary rays of `raymarch`, one thread.
+pub fn sampling(effort: &Effort, _: Level) -> Result<Vec<Row>, Failure> {
+    const TABLE: &str = "primary rays of raymarch: 256^3 u8, step half a voxel, one thread";
+    let bench = Bench::new(ct(effort.pick(256, 64)), 1)?;
+    let side = effort.pick(512, 128);
+    let flat = |cell: u32, density: f64| {
+        bench.scene(&json!({
+            "film": { "size": [side, side] }, "medium": { "density": density },
+            "render": { "integrator": "raymarch", "max_scatter": 0, "path": { "majorant_cell": cell } },
+        }))
+    };
+    // So thin that no ray ends early; one cell around everything is never empty.
+    let (all, skipping) = (flat(0, 1e-4)?, flat(8, 1e-4)?);
+    let samples = steps(&all, 0.5);
+    let cells = skipping.medium.majorants().opacities();
+    let full = cells.iter().filter(|o| o[1] > 0.0).count() as f64 / cells.len() as f64;
+    let levels = Level::available();
+    let mut ways: Vec<Box<dyn FnMut() + '_>> = Vec::new();
+    for &level in &levels {
+        for scene in [&all, &skipping] {
+            let bench = &bench;
+            ways.push(Box::new(move || drop(bench.render(scene, level, 1))));
+        }
+    }
+    let mut turns: Vec<&mut dyn FnMut()> =
+        ways.iter_mut().map(|way| &mut **way as &mut dyn FnMut()).collect();
+    let seconds = effort.by_turns(&mut turns);
+    let mut rows = vec![Row::new(TABLE, "cells of 8^3", "with matter", "share", full)];
+    for (i, level) in levels.iter().enumerate() {
+        let (plain, skipped) = (seconds[2 * i], seconds[2 * i + 1]);
+        let name = level.name();
+        let per_sample = Row::new(TABLE, name, "no skipping, per sample", "ns", plain / samples * 1e9);
+        rows.push(if i > 0 { per_sample.at_most(4.0) } else { per_sample });
+        rows.push(Row::new(TABLE, name, "skipping, per frame", "ms", skipped * 1e3));
+        rows.push(Row::new(TABLE, name, "skipping over not", "ratio", plain / skipped).at_least(3.0));
+        if i > 0 {
+            rows.push(
+                Row::new(TABLE, name, "over scalar, no skipping", "ratio", seconds[0] / plain).at_least(4.0),
+            );
+            rows.push(
+                Row::new(TABLE, name, "over scalar, skipping", "ratio", seconds[1] / skipped).at_least(2.5),
+            );
+        }
+    }
+    Ok(rows)
+}
+
+/// Rays from all around through the middle of a medium.
+fn transmittances(medium: &Medium, level: Level, rays: u32) -> f32 {
+    let bounds = medium.volume().grid().world_bounds();
+    let (middle, size) = (bounds.center(), bounds.size());
+    let mut sum = 0.0;
+    for i in 0..rays {
+        let mut stream = Stream::new(1, [i, 0, 0]);
+        let mut point = || Vec3::new(stream.uniform(), stream.uniform(), stream.uniform()) - 0.5;
+        let (from, to) = (middle + point() * size * 2.0, middle + point() * size * 0.5);
+        let track = medium.track(&Ray::new(from, (to - from).normalize()), f32::INFINITY);
+        sum += medium.transmittance(level, &track, &mut stream);
+    }
+    sum
+}
+
+/// Ratio tracking with one majorant and with local ones.
+pub fn flight(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
+    const TABLE: &str = "transmittance by ratio tracking, one thread";
+    let mut rows = Vec::new();
+    for (name, value, floor) in [("CT-like", ct(256), 5.0), ("cloud", cloud(128), 1.6)] {
+        let bench = Bench::new(value, 1)?;
+        let scene = |cell: u32| bench.scene(&json!({ "render": { "path": { "majorant_cell": cell } } }));
+        let (global, local) = (scene(0)?, scene(8)?);
+        let rays = effort.pick(100_000, 5_000);
+        let run = |scene: &Scene| {
+            std::hint::black_box(transmittances(&scene.medium, level, rays));
+        };
+        let seconds = effort.by_turns(&mut [&mut || run(&global), &mut || run(&local)]);
+        rows.push(Row::new(TABLE, name, "local majorants", "M rays/s", f64::from(rays) / seconds[1] * 1e-6));
+        rows.push(
+            Row::new(TABLE, name, "local over global", "ratio", seconds[0] / seconds[1]).at_least(floor),
+        );
+    }
+    Ok(rows)
+}
+
+/// Path tracing with one majorant and with local ones, two scatterings.
+pub fn paths(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
+    const TABLE: &str = "path with two scatterings, one thread";
+    let mut rows = Vec::new();
+    for (name, value, floor) in [("CT-like", ct(256), 2.2), ("cloud", cloud(128), 1.2)] {
+        let bench = Bench::new(value, 1)?;
+        let side = effort.pick(256, 64);
+        let scene = |cell: u32| {
+            let render = json!({ "integrator": "path", "max_scatter": 2, "path": { "majorant_cell": cell } });
+            bench.scene(&json!({ "film": { "size": [side, side] }, "render": render }))
+        };
+        let (global, local) = (scene(0)?, scene(8)?);
+        let run = |scene: &Scene| drop(bench.render(scene, level, 2));
+        let seconds = effort.by_turns(&mut [&mut || run(&global), &mut || run(&local)]);
+        let paths = 2.0 * f64::from(side).powi(2);
+        rows.push(Row::new(TABLE, name, "local majorants", "M paths/s", paths / seconds[1] * 1e-6));
+        rows.push(
+            Row::new(TABLE, name, "local over global", "ratio", seconds[0] / seconds[1]).at_least(floor),
+        );
+    }
+    Ok(rows)
+}
+
+/// Two threads against one.
+pub fn threads(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
+    const TABLE: &str = "two threads over one";
+    let mut rows = Vec::new();
+    for integrator in ["raymarch", "path"] {
+        let benches = [Bench::new(ct(256), 1)?, Bench::new(ct(256), 2)?];
+        let side = effort.pick(256, 64);
+        let patch = json!({
+            "film": { "size": [side, side] }, "lights": [ct(256)["lights"][0]],
+            "render": { "integrator": integrator, "max_scatter": effort.pick(8, 1) },
+        });
+        let scenes = [benches[0].scene(&patch)?, benches[1].scene(&patch)?];
+        let run = |i: usize| drop(benches[i].render(&scenes[i], level, 4));
+        let seconds = effort.by_turns(&mut [&mut || run(0), &mut || run(1)]);
+        rows.push(Row::new(TABLE, integrator, "speed-up", "ratio", seconds[0] / seconds[1]).at_least(1.6));
+    }
+    Ok(rows)
+}
+
+/// How late a deadline is honoured, and how long an edit of the transfer function takes to prepare.
+pub fn latency(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
+    const TABLE: &str = "latency, two threads";
+    let bench = Bench::new(ct(effort.pick(256, 64)), 2)?;
+    let mut rows = Vec::new();
+    for integrator in ["raymarch", "path"] {
+        let patch = json!({ "render": { "integrator": integrator, "max_scatter": 1000 } });
+        let mut session = Session::with_level(bench.scene(&patch)?, bench.threads().clone(), level);
+        let mut late: Vec<f64> = (0..effort.pick(40, 4))
+            .map(|_| {
+                let deadline = Instant::now() + Duration::from_millis(25);
+                session.refine(&Budget { deadline: Some(deadline), ..Budget::samples(u32::MAX) });
+                deadline.elapsed().as_secs_f64() * 1e3
+            })
+            .collect();
+        late.sort_by(f64::total_cmp);
+        let name = format!("{integrator}: past the deadline");
+        rows.push(Row::new(TABLE, name.clone(), "median", "ms", late[late.len() / 2]).at_most(5.0));
+        rows.push(Row::new(TABLE, name, "worst", "ms", late[late.len() - 1]).at_most(5.0));
+    }
+    let scene = bench.scene(&json!({}))?;
+    let (volume, transfer) = (scene.medium.volume(), scene.medium.transfer());
+    let rebuild = || drop(bench.threads().install(|| MajorantGrid::new(volume, transfer, 8)));
+    let seconds = effort.seconds(&mut { rebuild });
+    rows.push(
+        Row::new(TABLE, "majorants after a transfer-function edit", "256^3", "ms", seconds * 1e3)
+            .at_most(33.0),
+    );
+    Ok(rows)
+}

@@ -1,0 +1,98 @@
+//! `tyndall bench`: tables of what this machine does, as ratios measured by turns in one run wherever there is a rival.
+
+mod core;
+mod growth;
+mod scenes;
+mod timing;
+
+use crate::args::{BenchName, BenchOptions};
+use crate::{Failure, say};
+use serde_json::{Value, json};
+
+/// One figure.
+pub struct Row {
+    /// The table that it belongs to.
+    pub table: &'static str,
+    /// What was measured.
+    pub row: String,
+    /// Which property of it.
+    pub quantity: &'static str,
+    /// The figure's unit; "ratio" has none.
+    pub unit: &'static str,
+    /// What was found.
+    pub ours: f64,
+    /// At least (positive) or at most (negative) this much is aimed at.
+    pub floor: Option<f64>,
+}
+
+impl Row {
+    /// A figure without a target.
+    pub fn new(
+        table: &'static str,
+        row: impl Into<String>,
+        quantity: &'static str,
+        unit: &'static str,
+        ours: f64,
+    ) -> Self {
+        Self { table, row: row.into(), quantity, unit, ours, floor: None }
+    }
+
+    /// Asked to be at least so much.
+    pub fn at_least(mut self, floor: f64) -> Self {
+        self.floor = Some(floor);
+        self
+    }
+
+    /// Asked to be at most so much.
+    pub fn at_most(mut self, ceiling: f64) -> Self {
+        self.floor = Some(-ceiling);
+        self
+    }
+
+    fn target(&self) -> String {
+        match self.floor {
+            None => String::new(),
+            Some(floor) if floor >= 0.0 => format!(">= {floor}"),
+            Some(ceiling) => format!("<= {}", -ceiling),
+        }
+    }
+
+    fn json(&self, reduced: bool) -> Value {
+        json!({
+            "table": self.table, "row": self.row, "quantity": self.quantity, "unit": self.unit,
+            // The core has no paper whose figures would stand beside these.
+            "paper": null, "ours": self.ours, "reduced": reduced, "extrapolated": false, "target": self.target(),
+        })
+    }
+
+    fn line(&self) -> String {
+        let Self { row, quantity, unit, ours, .. } = self;
+        format!("{row:<44} {quantity:<34} {ours:>10.3} {unit:<8} {}\n", self.target())
+    }
+}
+
+/// Measures the rows of one table with certain vector instructions.
+type Table = fn(&timing::Effort, tyndall::simd::Level) -> Result<Vec<Row>, Failure>;
+
+/// Runs the tables and prints each as soon as it is there, or all as JSON.
+pub fn run(options: &BenchOptions) -> Result<(), Failure> {
+    let (BenchName::Core | BenchName::All) = options.name;
+    let level = crate::render::vector_instructions()?;
+    let effort = timing::Effort::new(options.quick);
+    let mut all = Vec::new();
+    let tables: [Table; 6] =
+        [core::sampling, core::flight, core::paths, core::threads, core::latency, growth::curves];
+    for table in tables {
+        let rows = table(&effort, level)?;
+        if !options.json {
+            let title = rows.first().map_or("", |row| row.table);
+            say(&format!("\n{title}\n{}", rows.iter().map(Row::line).collect::<String>()))?;
+        }
+        all.extend(rows);
+    }
+    if options.json {
+        let rows: Vec<Value> = all.iter().map(|row| row.json(options.quick)).collect();
+        say(&format!("{:#}\n", Value::Array(rows)))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,75 @@
+//! The scenes that are measured, all generated.
+
+use crate::Failure;
+use serde_json::{Value, json};
+use std::path::Path;
+use std::sync::Arc;
+use tyndall::scene::document::{self, Document};
+use tyndall::scene::{Assets, Scene};
+use tyndall::session::{Budget, Session};
+use tyndall::simd::Level;
+use tyndall_formats::assets;
+
+/// A mostly empty volume with a thin dense shell, as CT is; 8-bit.
+pub fn ct(voxels: u32) -> Value {
+    let clear = |value: f64| json!({ "value": value, "opacity": 0.0 });
+    let dense = |value: f64| json!({ "value": value, "opacity": 1.0, "albedo": [0.9, 0.85, 0.8] });
+    json!({
+        "version": 1,
+        "volume": { "procedural": { "kind": "shells", "size": [voxels, voxels, voxels] } },
+        "transfer_function": { "points": [clear(0.19), dense(0.25), clear(0.31)] },
+        "medium": { "density": 60.0 / f64::from(voxels) },
+        "lights": [{ "type": "directional", "direction": [1, -1, -1], "irradiance": [3, 3, 3] },
+                   { "type": "environment", "radiance": [0.3, 0.3, 0.35] }],
+    })
+}
+
+/// A soft cloud that fills much of its box.
+pub fn cloud(voxels: u32) -> Value {
+    json!({
+        "version": 1,
+        "volume": { "procedural": { "kind": "cloud", "size": [voxels, voxels, voxels] } },
+        "transfer_function": { "points": [{ "value": 0.0, "opacity": 0.0, "albedo": [0.99, 0.99, 0.99] },
+                                          { "value": 1.0, "opacity": 1.0, "albedo": [0.99, 0.99, 0.99] }] },
+        "medium": { "density": 60.0 / f64::from(voxels) },
+        "lights": [{ "type": "directional", "direction": [1, -1, -1], "irradiance": [3, 3, 3] },
+                   { "type": "environment", "radiance": [0.3, 0.3, 0.35] }],
+    })
+}
+
+/// A document with its volume, from which scenes that differ in other keys are made without reading it again.
+pub struct Bench {
+    value: Value,
+    assets: Assets,
+    threads: Arc<rayon::ThreadPool>,
+}
+
+impl Bench {
+    /// Makes the volume.
+    pub fn new(value: Value, threads: usize) -> Result<Self, Failure> {
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map(Arc::new);
+        let threads = threads.map_err(|e| Failure::input(format!("threads: {e}")))?;
+        let document = Document::from_value(value.clone()).map_err(Failure::input)?;
+        let (assets, _) =
+            threads.install(|| assets::load(&document, Path::new(""))).map_err(Failure::input)?;
+        Ok(Self { value, assets, threads })
+    }
+
+    /// The scene with a patch laid over it.
+    pub fn scene(&self, patch: &Value) -> Result<Scene, Failure> {
+        let document = Document::from_value(document::apply(&self.value, patch)).map_err(Failure::input)?;
+        self.threads.install(|| Scene::build(&document, &self.assets)).map_err(Failure::input)
+    }
+
+    /// The threads that it renders on.
+    pub fn threads(&self) -> &Arc<rayon::ThreadPool> {
+        &self.threads
+    }
+
+    /// Renders a scene from nothing.
+    pub fn render(&self, scene: &Scene, level: Level, samples: u32) -> Session {
+        let mut session = Session::with_level(scene.clone(), self.threads.clone(), level);
+        session.refine(&Budget::samples(samples));
+        session
+    }
+}
