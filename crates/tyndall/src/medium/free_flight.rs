@@ -96,7 +96,7 @@ impl Medium {
         transmittance * collisions.take(simd, self, track) * (-control).exp()
     }
 
-    /// [`Self::transmittance_lanes`] by itself: an unbiased estimate of the transmittance along a track.
+    /// An unbiased estimate of the transmittance along a track, by residual ratio tracking \[Novak14\].
     #[must_use]
     pub fn transmittance(&self, level: Level, track: &Track, stream: &mut Stream) -> f32 {
         struct Estimate<'a>(&'a Medium, &'a Track, &'a mut Stream);
