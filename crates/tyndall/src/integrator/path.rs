@@ -8,7 +8,6 @@ use super::Stop;
 use crate::film::{PixelSample, Tile};
 use crate::light::LightSample;
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::Medium;
 use crate::sampling::{BounceSample, PathSampler};
 use crate::scattering::Event;
 use crate::scene::Scene;
@@ -154,7 +153,7 @@ impl Walk {
             seen.alpha = 1.0;
             seen.depth = reach * ray.direction.dot(scene.camera.view());
         }
-        let emitted = Medium::emitted(&optics);
+        let emitted = optics.emitted();
         if !emitted.is_black() {
             let sigma_t = medium.density() * optics.opacity;
             let weight =

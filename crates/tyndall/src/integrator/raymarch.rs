@@ -6,7 +6,7 @@
 use super::Stop;
 use crate::film::{PixelSample, Tile};
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::{MOST_LANES, Medium, PacketMarch, Track};
+use crate::medium::{MOST_LANES, PacketMarch, Track};
 use crate::scattering::Event;
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes, Level, one_minus_exp};
@@ -66,7 +66,7 @@ impl RayMarch {
     #[inline(always)]
     fn go_on<S: Lanes>(&self, simd: S, scene: &Scene, packet: &mut Packet, stop: &Stop) -> bool {
         let medium = &*scene.medium;
-        let shines = scene.render.max_scatter > 0 || medium.transfer().emits();
+        let (shines, glows) = (scene.render.max_scatter > 0, medium.transfer().emits());
         let most = S::f32s::splat(simd, 1.0 - OPAQUE);
         let mut alpha = S::f32s::from_slice(simd, &packet.alpha[..S::WIDTH]);
         let mut depth = S::f32s::from_slice(simd, &packet.depth[..S::WIDTH]);
@@ -99,6 +99,12 @@ impl RayMarch {
                 packet.radiance[lane] += source * covered;
                 moved = true;
             }
+            if !shines && glows {
+                for lane in 0..packet.count {
+                    let emitted = medium.transfer().emitted(sample.value.as_slice()[lane]);
+                    packet.radiance[lane] += emitted * covered.as_slice()[lane];
+                }
+            }
             packet.shaded = 0;
             alpha += covered;
             depth += sample.t * covered;
@@ -114,12 +120,8 @@ impl RayMarch {
     fn source<S: Lanes>(&self, simd: S, scene: &Scene, place: Vec3, value: f32, w_out: Vec3) -> Rgb {
         let medium = &*scene.medium;
         let optics = medium.transfer().optics(value);
-        let emitted = Medium::emitted(&optics);
-        if scene.render.max_scatter == 0 {
-            return emitted;
-        }
         let here = medium.volume().grid().index_to_world(place);
-        emitted + self.direct(simd, scene, &medium.event(place, &optics), here, w_out)
+        optics.emitted() + self.direct(simd, scene, &medium.event(place, &optics), here, w_out)
     }
 
     /// Light from every lamp that a point scatters to `w_out`, per unit extinction.

@@ -74,7 +74,7 @@ impl Emission {
         let to_light = medium.volume().grid().index_to_world(place) - from;
         let squared = to_light.length_squared();
         let sigma_t = medium.density() * optics.opacity;
-        let emitted = Medium::emitted(&optics) * sigma_t;
+        let emitted = optics.emitted() * sigma_t;
         if squared == 0.0 || emitted.is_black() {
             return None;
         }
@@ -111,7 +111,7 @@ fn mean_emission(medium: &Medium, cell: &Bounds) -> f32 {
         for y in steps(1) {
             for x in steps(0) {
                 let optics = medium.optics(Vec3::new(x, y, z));
-                sum += optics.opacity * Medium::emitted(&optics).luminance();
+                sum += optics.opacity * optics.emitted().luminance();
                 count += 1.0;
             }
         }

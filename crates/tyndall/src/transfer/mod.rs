@@ -4,13 +4,18 @@
 //! which the later holds from there. All optics are evaluated segment by segment, which a small index finds in
 //! constant time; the opacity alone, which is read most, also from a table that agrees with them but for rounding.
 
+mod difference;
+mod glow;
 mod presets;
 mod table;
 
+pub use difference::{BinSet, TransferDifference};
 pub use presets::{PRESETS, Preset};
 
 use crate::math::{Rgb, cast};
 use crate::simd::Lanes;
+use crate::volume::ValueBins;
+use glow::GlowTable;
 use table::OpacityTable;
 
 /// The optics of matter at one data value.
@@ -48,6 +53,13 @@ impl Default for Optics {
 }
 
 impl Optics {
+    /// Radiance that matter adds per unit of extinction on a path, `(1 - albedo) Le`.
+    #[inline]
+    #[must_use]
+    pub fn emitted(&self) -> Rgb {
+        (Rgb::WHITE - self.albedo) * self.emission
+    }
+
     /// From `self` (t = 0) to `other` (t = 1), every quantity by itself.
     #[inline]
     #[must_use]
@@ -96,15 +108,29 @@ pub struct TransferFunction {
     segments: Vec<u32>,
     bins_per_value: f32,
     opacities: OpacityTable,
+    /// `None` where nothing glows.
+    glow: Option<GlowTable>,
 }
 
 /// Bins of the segment index.
 const BINS: usize = 256;
 
 impl TransferFunction {
+    /// With a table over the points' own values.
+    ///
     /// # Errors
     /// [`TransferError`] if there is no point or the values do not ascend.
     pub fn new(points: Vec<Point>) -> Result<Self, TransferError> {
+        let end = |point: Option<&Point>| point.map_or(0.0, |p| p.value);
+        let bins = ValueBins::new([end(points.first()), end(points.last())]);
+        Self::over(bins, points)
+    }
+
+    /// With a table in certain bins, those of a volume, which no edit of the points moves.
+    ///
+    /// # Errors
+    /// [`TransferError`] if there is no point or the values do not ascend.
+    pub fn over(bins: ValueBins, points: Vec<Point>) -> Result<Self, TransferError> {
         let (Some(first), Some(last)) = (points.first(), points.last()) else {
             return Err(TransferError::Empty);
         };
@@ -123,13 +149,24 @@ impl TransferFunction {
             .map(|bin| points.partition_point(|p| p.value <= lower_end(bin.saturating_sub(1))))
             .map(|after| cast::fit_u32(after.saturating_sub(1)))
             .collect();
-        Ok(Self { opacities: OpacityTable::new(&points), points, segments, bins_per_value })
+        let opacities = OpacityTable::new(&points, bins);
+        let mut function = Self { points, segments, bins_per_value, opacities, glow: None };
+        if function.points.iter().any(|p| !p.optics.emission.is_black()) {
+            function.glow = Some(GlowTable::new(&function.points, bins, |value| function.optics(value)));
+        }
+        Ok(function)
     }
 
     /// The points, ascending.
     #[must_use]
     pub fn points(&self) -> &[Point] {
         &self.points
+    }
+
+    /// The bins of the table.
+    #[must_use]
+    pub fn bins(&self) -> ValueBins {
+        self.opacities.bins()
     }
 
     /// The segment that holds `value`: its two points and the place between them.
@@ -177,24 +214,15 @@ impl TransferFunction {
         self.opacities.opacities(simd, values, |value| self.exact_opacity(value))
     }
 
-    /// Smallest and largest of a quantity over data values `[lo, hi]`, given what it is at these ends; exact, since a
-    /// piecewise linear quantity has its extremes at the ends or at points between them.
-    fn extremes(&self, [lo, hi]: [f32; 2], ends: [f32; 2], quantity: impl Fn(&Optics) -> f32) -> [f32; 2] {
-        let mut range = [ends[0].min(ends[1]), ends[0].max(ends[1])];
-        // Points that the table cannot tell from an end count as on its far side, as they do in a look-up.
-        let place = |value| self.opacities.place(value);
-        let first = self.points.partition_point(|p| p.value <= lo || place(p.value) <= place(lo));
-        for point in self.points[first..].iter().take_while(|p| place(p.value) <= place(hi)) {
-            let x = quantity(&point.optics);
-            range = [range[0].min(x), range[1].max(x)];
-        }
-        range
-    }
-
     /// Smallest and largest opacity over data values `[lo, hi]`.
     #[must_use]
     pub fn opacity_range(&self, values: [f32; 2]) -> [f32; 2] {
-        self.extremes(values, values.map(|v| self.opacity(v)), |o| o.opacity)
+        let [lo, hi] = values;
+        // Points that the table cannot tell from an end count as on its far side, as they do in a look-up.
+        let table = &self.opacities;
+        let first = self.points.partition_point(|p| p.value <= lo || table.confuses(lo, p.value));
+        let last = self.points.partition_point(|p| p.value <= hi || table.confuses(hi, p.value));
+        extremes(&self.points[first..last.max(first)], values.map(|v| self.opacity(v)), |o| o.opacity)
     }
 
     /// An upper bound of the luminance that matter with values in `[lo, hi]` emits per unit length at
@@ -202,8 +230,10 @@ impl TransferFunction {
     #[must_use]
     pub fn emission_bound(&self, values: [f32; 2]) -> f32 {
         let [_, opacity] = self.opacity_range(values);
+        let [first, last] = values.map(|v| self.points.partition_point(|p| p.value <= v));
         let ends = values.map(|v| self.optics(v));
-        let most = |f: fn(&Optics) -> f32| self.extremes(values, [f(&ends[0]), f(&ends[1])], f)[1];
+        let most =
+            |f: fn(&Optics) -> f32| extremes(&self.points[first..last], [f(&ends[0]), f(&ends[1])], f)[1];
         let channel = [
             most(|o| 1.0 - o.albedo.r) * most(|o| o.emission.r),
             most(|o| 1.0 - o.albedo.g) * most(|o| o.emission.g),
@@ -215,8 +245,26 @@ impl TransferFunction {
     /// Whether any matter glows.
     #[must_use]
     pub fn emits(&self) -> bool {
-        self.points.iter().any(|p| !p.optics.emission.is_black())
+        self.glow.is_some()
     }
+
+    /// [`Optics::emitted`] at a data value, for the many look-ups that need no more.
+    #[inline]
+    #[must_use]
+    pub fn emitted(&self, value: f32) -> Rgb {
+        let Some(glow) = &self.glow else { return Rgb::BLACK };
+        glow.emitted(value).unwrap_or_else(|| self.optics(value).emitted())
+    }
+}
+
+/// Smallest and largest of a quantity, given the points inside a range and what it is at the range's ends; exact, since a
+/// piecewise linear quantity has its extremes at the ends or at points between them.
+fn extremes(inside: &[Point], ends: [f32; 2], quantity: impl Fn(&Optics) -> f32) -> [f32; 2] {
+    inside
+        .iter()
+        .map(|point| quantity(&point.optics))
+        .chain(ends)
+        .fold([f32::INFINITY, f32::NEG_INFINITY], |[least, most], x| [least.min(x), most.max(x)])
 }
 
 #[cfg(test)]

@@ -6,10 +6,8 @@
 use super::Point;
 use crate::math::cast;
 use crate::simd::Lanes;
+use crate::volume::ValueBins;
 use fearless_simd::prelude::*;
-
-/// Bins between the first and the last point. Two more hold what is below and above them.
-const BINS: usize = 1024;
 
 /// Opacity per bin above which the rounding of a place in the bin would show, being 2^-14 of a bin at most.
 const STEEPEST: f64 = 8.0;
@@ -17,9 +15,7 @@ const STEEPEST: f64 = 8.0;
 /// See the module.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct OpacityTable {
-    /// Half the first point's value, and bins per half a unit of value: halves, whose differences never overflow.
-    first: f32,
-    bins: f32,
+    bins: ValueBins,
     /// Where in its bin the second line begins, from 0 to 1; above that where there is one line alone, NaN in rough bins.
     splits: Vec<f32>,
     /// Per bin twice a line: opacity where it begins, at the bin's lower end or at the split, and its rise per bin.
@@ -29,22 +25,18 @@ pub(super) struct OpacityTable {
 
 impl OpacityTable {
     /// The table of points in ascending order, at least one.
-    pub(super) fn new(points: &[Point]) -> Self {
-        let (first, last) = (points[0].value, points[points.len() - 1].value);
-        let span = 0.5 * last - 0.5 * first;
-        let bins = if span > 0.0 { BINS as f32 / span } else { 1.0 };
-        let mut table =
-            Self { first: 0.5 * first, bins, splits: Vec::new(), lines: Vec::new(), any_rough: false };
+    pub(super) fn new(points: &[Point], bins: ValueBins) -> Self {
+        let mut table = Self { bins, splits: Vec::new(), lines: Vec::new(), any_rough: false };
         // Of points that fall on one place the last holds from there.
         let knots: Vec<[f64; 2]> =
-            points.iter().map(|p| [f64::from(table.place(p.value)), f64::from(p.optics.opacity)]).collect();
+            points.iter().map(|p| [bins.place_beyond(p.value), f64::from(p.optics.opacity)]).collect();
         // The line after a knot, told from a place on.
         let line = |after: usize, place: f64| -> [f64; 2] {
             let ([x, o], next) = (knots[after], knots.get(after + 1));
             let slope = next.filter(|n| n[0] > x).map_or(0.0, |n| (n[1] - o) / (n[0] - x));
             [o + slope * (place - x), slope]
         };
-        for bin in 0..BINS + 2 {
+        for bin in 0..ValueBins::COUNT {
             let lower = bin as f64;
             let start = knots.partition_point(|k| k[0] <= lower);
             let end = knots.partition_point(|k| k[0] < lower + 1.0);
@@ -54,7 +46,15 @@ impl OpacityTable {
             let above = if places.is_empty() { below } else { line(end - 1, lower + split) };
             let one_place = places.iter().all(|k| k[0] == places[0][0]);
             let steep = [below, above].iter().any(|l| l[1].abs() > STEEPEST);
-            let rough = !one_place || !bins.is_normal() || steep;
+            // Whatever lies beyond the outer ends is looked up at them.
+            let beyond = match bin {
+                0 => &knots[..knots.len().min(start + 1)],
+                _ if bin + 1 == ValueBins::COUNT => &knots[start.saturating_sub(1)..],
+                _ => &[],
+            };
+            let outside = if bin == 0 { knots[0][0] < lower } else { knots[knots.len() - 1][0] > lower };
+            let varies = outside && beyond.iter().any(|k| k[1] != beyond[0][1]);
+            let rough = !one_place || !bins.are_distinct() || steep || varies;
             table.splits.push(if rough { f32::NAN } else { cast::single(split) });
             table.lines.extend([below, above].as_flattened().iter().map(|&x| cast::single(x)));
             table.any_rough |= rough;
@@ -62,16 +62,27 @@ impl OpacityTable {
         table
     }
 
-    /// The bin and the place in it of a value; it never falls as values rise.
-    #[inline]
-    pub(super) fn place(&self, value: f32) -> f32 {
-        ((value * 0.5 - self.first) * self.bins + 1.0).max(0.0).min((BINS + 1) as f32)
+    /// The bins that the table is kept in.
+    pub(super) fn bins(&self) -> ValueBins {
+        self.bins
+    }
+
+    /// All that a look-up in a bin reads; two functions that agree in it look up the same bits, unless the bin is rough.
+    pub(super) fn entry(&self, bin: usize) -> [u32; 5] {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|i| self.lines[4 * bin + i].to_bits());
+        [self.splits[bin].to_bits(), a, b, c, d]
+    }
+
+    /// Whether the table cannot tell the first value from the second, nor what lies between them.
+    pub(super) fn confuses(&self, a: f32, b: f32) -> bool {
+        let place = self.bins.place(a);
+        place == self.bins.place(b) && !self.splits[cast::index(place)].is_nan()
     }
 
     /// Opacity at a value; `None` in a rough bin.
     #[inline]
     pub(super) fn opacity(&self, value: f32) -> Option<f32> {
-        let place = self.place(value);
+        let place = self.bins.place(value);
         let bin = cast::index(place);
         let within = place - bin as f32;
         let split = self.splits[bin];
@@ -90,9 +101,10 @@ impl OpacityTable {
         values: S::f32s,
         exact: impl Fn(f32) -> f32,
     ) -> S::f32s {
-        let top = S::f32s::splat(simd, (BINS + 1) as f32);
+        let top = S::f32s::splat(simd, (ValueBins::COUNT - 1) as f32);
+        let [half_first, per_half] = self.bins.numbers();
         // Without fused operations, so that a value falls on the same side of a jump as in `place`.
-        let place = ((values * 0.5 - self.first) * self.bins + 1.0).max(0.0).min(top);
+        let place = ((values * 0.5 - half_first) * per_half + 1.0).max(0.0).min(top);
         let bin: S::i32s = place.to_int();
         let within = place - bin.to_float::<S::f32s>();
         let bin: S::u32s = bin.bitcast();

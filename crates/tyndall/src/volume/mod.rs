@@ -8,6 +8,7 @@ mod cells;
 mod grid;
 mod lanes;
 mod statistics;
+mod value_bins;
 mod voxels;
 
 pub mod procedural;
@@ -16,6 +17,7 @@ pub use bricks::Bricks;
 pub use cells::Cells;
 pub use grid::{Grid, GridError, Space};
 pub use statistics::Histogram;
+pub use value_bins::ValueBins;
 pub use voxels::{Voxel, Voxels};
 
 use crate::math::{Vec3, cast};
@@ -136,6 +138,15 @@ impl Volume {
         self
     }
 
+    /// Whether two volumes share their samples and read them alike.
+    #[must_use]
+    pub fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.bricks, &other.bricks)
+            && self.grid == other.grid
+            && self.values == other.values
+            && self.interpolation == other.interpolation
+    }
+
     /// How the field is read between voxel centres.
     #[must_use]
     pub fn interpolation(&self) -> Interpolation {
@@ -183,6 +194,21 @@ impl Volume {
     #[must_use]
     pub fn robust_range(&self) -> [f64; 2] {
         self.robust_range
+    }
+
+    /// Bins over all values that can be read here; over those of the robust range where outliers would leave that few
+    /// bins.
+    #[must_use]
+    pub fn value_bins(&self) -> ValueBins {
+        /// Past so many times the robust range, outliers have the outer bins to themselves.
+        const FAR_OUT: f64 = 16.0;
+
+        let width = |[lo, hi]: [f64; 2]| hi - lo;
+        let few = width(self.value_range) > FAR_OUT * width(self.robust_range);
+        let [lo, hi] = (if few { self.robust_range } else { self.value_range }).map(cast::single);
+        // A bin more at either end holds what interpolation rounds up or down.
+        let bin = (0.5 * hi - 0.5 * lo) / (ValueBins::INSIDE as f32 / 2.0);
+        ValueBins::new([(lo - bin).max(f32::MIN), (hi + bin).min(f32::MAX)])
     }
 
     /// How many samples were NaN or infinite in the file.
