@@ -2,7 +2,7 @@
 
 use crate::film::{Film, Image};
 use crate::integrator::{Integrator, Pending, Stop};
-use crate::scene::{IntegratorKind, Scene};
+use crate::scene::{Difference, IntegratorKind, Scene};
 use crate::simd::Level;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -46,6 +46,9 @@ pub struct Session {
     /// What a stop left half done, per tile.
     pending: Vec<Pending>,
     threads: Arc<rayon::ThreadPool>,
+    level: Level,
+    /// Samples per pixel, on average, that the last edit left valid.
+    kept: f64,
 }
 
 impl Session {
@@ -61,7 +64,33 @@ impl Session {
         let integrator = threads.install(|| Integrator::new(&scene, level));
         let mut film = Film::new(scene.size);
         let pending = vec![Pending::default(); film.tiles_mut().len()];
-        Self { integrator, film, pending, scene, threads }
+        Self { integrator, film, pending, scene, threads, level, kept: 0.0 }
+    }
+
+    /// Goes on with an edited scene; gives what the edit changed. This is the only place where light is discarded, and the
+    /// difference alone decides what: after it the session will come to the picture that a new one would.
+    pub fn set_scene(&mut self, scene: Scene) -> Difference {
+        let difference = Difference::between(&self.scene, &scene);
+        if self.integrator.is_touched_by(&difference) {
+            *self = Self::with_level(scene, self.threads.clone(), self.level);
+        } else {
+            self.scene = scene;
+            self.kept = self.film.mean_samples();
+        }
+        difference
+    }
+
+    /// Of what the session is made of, the share that was really computed since the last edit, or since the beginning:
+    /// of the `pixels` those that took samples.
+    #[must_use]
+    pub fn recomputed(&self) -> [(&'static str, f64); 1] {
+        [("pixels", (self.film.mean_samples() - self.kept).min(1.0))]
+    }
+
+    /// Threads that work.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.threads.current_num_threads()
     }
 
     /// What is rendered.

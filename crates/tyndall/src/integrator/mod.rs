@@ -9,7 +9,7 @@ pub use raymarch::RayMarch;
 pub use stop::Stop;
 
 use crate::film::Tile;
-use crate::scene::{IntegratorKind, Scene};
+use crate::scene::{Difference, IntegratorKind, Scene};
 use crate::simd::Level;
 use path::Walk;
 use raymarch::Packet;
@@ -32,6 +32,17 @@ impl Integrator {
                 Self::RayMarch(RayMarch::new(scene, step, light_samples, level))
             }
             IntegratorKind::Path => Self::Path(Path::new(level)),
+        }
+    }
+
+    /// Whether samples taken before an edit may differ, by a bit or more, from those that would be taken now.
+    #[must_use]
+    pub fn is_touched_by(&self, difference: &Difference) -> bool {
+        // Cells decide which numbers tracking draws, and in which order a march adds up what it meets.
+        let touched = difference.view() || difference.light() || difference.majorants;
+        match self {
+            Self::RayMarch(_) => touched,
+            Self::Path(_) => touched || difference.seed,
         }
     }
 

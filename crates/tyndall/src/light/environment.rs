@@ -7,7 +7,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use std::sync::Arc;
 
 /// An environment: radiance from every direction.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
     sky: Sky,
     /// Whether the camera sees it.
@@ -22,6 +22,19 @@ enum Sky {
         /// Map coordinates to the world: `w` is up, `u` where the middle column lies.
         frame: Frame,
     },
+}
+
+/// Maps are compared by identity first: those of one scene edited are shared.
+impl PartialEq for Sky {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Constant(a), Self::Constant(b)) => a == b,
+            (Self::Map { map: a, frame: f }, Self::Map { map: b, frame: g }) => {
+                f == g && (Arc::ptr_eq(a, b) || a == b)
+            }
+            _ => false,
+        }
+    }
 }
 
 const UNIFORM_PDF: f32 = 0.25 * FRAC_1_PI;
@@ -89,7 +102,7 @@ impl Environment {
 }
 
 /// A sky by latitude (rows, the top row straight up) and longitude (columns), read bilinearly.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Map {
     width: usize,
     height: usize,

@@ -56,7 +56,7 @@ pub struct Passed {
 }
 
 /// Any light of the scene document.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Light {
     /// Parallel light, or nearly so.
     Directional(Directional),

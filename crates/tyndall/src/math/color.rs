@@ -77,11 +77,11 @@ impl Rgb {
         self.r.is_finite() && self.g.is_finite() && self.b.is_finite()
     }
 
-    /// From `self` (t = 0) to `other` (t = 1).
+    /// From `self` (t = 0) to `other` (t = 1); between equal colours exactly that colour.
     #[inline]
     #[must_use]
     pub fn lerp(self, other: Self, t: f32) -> Self {
-        self * (1.0 - t) + other * t
+        self + (other - self) * t
     }
 
     /// Applies `f` to every channel.

@@ -62,7 +62,8 @@ impl MajorantGrid {
     }
 
     /// Voxels along a cell's edge.
-    pub(super) fn edge(&self) -> f32 {
+    #[must_use]
+    pub fn edge(&self) -> f32 {
         self.edge
     }
 

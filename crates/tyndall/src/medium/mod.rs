@@ -13,7 +13,7 @@ pub use free_flight::Collision;
 pub use majorants::{CellStretch, CellWalk, MajorantGrid};
 pub(crate) use march::{MOST_LANES, PacketMarch};
 
-use crate::math::{Interval, Ray, Rgb, Vec3, cast};
+use crate::math::{Interval, Ray, Vec3, cast};
 use crate::scattering::{Brdf, Event, Phase, Surface, surface_share};
 use crate::transfer::{Optics, TransferFunction};
 use crate::volume::Volume;
@@ -126,6 +126,24 @@ impl Medium {
         self.density
     }
 
+    /// How surfaces reflect.
+    #[must_use]
+    pub fn brdf(&self) -> Brdf {
+        self.brdf
+    }
+
+    /// How fast matter becomes a surface as the gradient grows.
+    #[must_use]
+    pub fn gradient_factor(&self) -> f32 {
+        self.gradient_factor
+    }
+
+    /// What is cut away.
+    #[must_use]
+    pub fn clip(&self) -> &Clip {
+        &self.clip
+    }
+
     /// The phase function.
     #[must_use]
     pub fn phase(&self) -> Phase {
@@ -186,13 +204,6 @@ impl Medium {
             event.normal = (event.q > 0.0).then(|| gradient / length);
         }
         event
-    }
-
-    /// Radiance that matter adds per unit of extinction on a path, `(1 - albedo) Le`.
-    #[inline]
-    #[must_use]
-    pub fn emitted(optics: &Optics) -> Rgb {
-        (Rgb::WHITE - optics.albedo) * optics.emission
     }
 }
 

@@ -73,6 +73,10 @@ impl Scene {
                 .collect::<Result<_, _>>()?,
         };
         Ok(Self {
+            light_names: match &document.lights {
+                None => vec![None; lights.len()],
+                Some(lights) => lights.iter().map(|l| l.name().map(str::to_owned)).collect(),
+            },
             lights: Arc::new(LightSet::new(lights, &medium)),
             medium: Arc::new(medium),
             camera: camera(document, volume)?,
@@ -96,7 +100,7 @@ fn transfer(document: &Document, volume: &Volume) -> Result<TransferFunction, Sc
     } else {
         Preset::for_volume(volume).points(volume)
     };
-    TransferFunction::new(points).map_err(|e| fault("transfer_function.points", e))
+    TransferFunction::over(volume.value_bins(), points).map_err(|e| fault("transfer_function.points", e))
 }
 
 fn point(p: &document::TransferPoint) -> Point {

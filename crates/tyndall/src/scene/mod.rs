@@ -1,9 +1,11 @@
 //! A scene: everything that decides a picture, as one immutable value, cheap to clone.
 
 mod build;
+mod difference;
 pub mod document;
 
 pub use build::{Assets, SceneError};
+pub use difference::{Difference, LightOrigin, LightsDifference};
 
 use crate::camera::Camera;
 use crate::light::LightSet;
@@ -18,6 +20,8 @@ pub struct Scene {
     pub medium: Arc<Medium>,
     /// What shines on it.
     pub lights: Arc<LightSet>,
+    /// Names by which edits find the lights, one per light.
+    pub light_names: Vec<Option<String>>,
     /// Who looks.
     pub camera: Camera,
     /// Width and height of the picture; at least 1 each.

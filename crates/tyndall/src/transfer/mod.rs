@@ -248,6 +248,12 @@ impl TransferFunction {
         self.glow.is_some()
     }
 
+    /// Whether any matter has surfaces.
+    #[must_use]
+    pub fn reflects(&self) -> bool {
+        self.points.iter().any(|p| p.optics.surface > 0.0)
+    }
+
     /// [`Optics::emitted`] at a data value, for the many look-ups that need no more.
     #[inline]
     #[must_use]

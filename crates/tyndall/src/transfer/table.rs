@@ -67,12 +67,6 @@ impl OpacityTable {
         self.bins
     }
 
-    /// All that a look-up in a bin reads; two functions that agree in it look up the same bits, unless the bin is rough.
-    pub(super) fn entry(&self, bin: usize) -> [u32; 5] {
-        let [a, b, c, d] = [0, 1, 2, 3].map(|i| self.lines[4 * bin + i].to_bits());
-        [self.splits[bin].to_bits(), a, b, c, d]
-    }
-
     /// Whether the table cannot tell the first value from the second, nor what lies between them.
     pub(super) fn confuses(&self, a: f32, b: f32) -> bool {
         let place = self.bins.place(a);

@@ -59,6 +59,7 @@ impl Setup {
         let medium = Medium::new(Arc::new(self.volume), transfer, &settings);
         let lens = Lens::Orthographic { height: 1.0 };
         Scene {
+            light_names: vec![None; self.lights.len()],
             lights: Arc::new(LightSet::new(self.lights, &medium)),
             medium: Arc::new(medium),
             camera: Camera::new(Vec3::Z * 10.0, Vec3::ZERO, Vec3::Y, lens),

@@ -1,0 +1,146 @@
+//! What an edit changed: the only source of truth about it.
+
+use super::Scene;
+use crate::transfer::TransferDifference;
+
+/// What of one scene is no longer so in another, by what light reads. What only shows pictures (exposure, tone) or stops
+/// them (samples) is no part of a scene and never differs.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a thing by itself that changed or did not")]
+pub struct Difference {
+    /// Values that now mean other optics.
+    pub transfer: TransferDifference,
+    /// The new density over the old where that alone moved extinction; `None` where it did not change. Infinite where
+    /// there was none before.
+    pub density: Option<f32>,
+    /// How light turns where it scatters.
+    pub phase: bool,
+    /// How surfaces reflect, or how strong a gradient makes one, where matter has any.
+    pub surfaces: bool,
+    /// What is cut away.
+    pub clip: bool,
+    /// Samples, grid or interpolation.
+    pub volume: bool,
+    /// Edge of the majorant cells: what tracking draws, not what it means.
+    pub majorants: bool,
+    /// What became of the lights.
+    pub lights: LightsDifference,
+    /// From where the picture is taken.
+    pub camera: bool,
+    /// The picture's size.
+    pub size: bool,
+    /// What is behind everything.
+    pub background: bool,
+    /// The method, its own settings, or the scatterings that it keeps.
+    pub method: bool,
+    /// The random numbers.
+    pub seed: bool,
+}
+
+/// What became of the lights of a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LightsDifference {
+    /// Of every light of the new scene, where it comes from.
+    pub origins: Vec<LightOrigin>,
+    /// Numbers of the old lights that are gone.
+    pub removed: Vec<usize>,
+}
+
+/// Where a light comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightOrigin {
+    /// It is the old scene's light of this number, as it was.
+    Same(usize),
+    /// It is the old scene's light of this number, but shines otherwise.
+    Changed(usize),
+    /// It was not there.
+    New,
+}
+
+impl Difference {
+    /// Compares two scenes.
+    #[must_use]
+    pub fn between(old: &Scene, new: &Scene) -> Self {
+        let (was, is) = (&*old.medium, &*new.medium);
+        let reflects = was.transfer().reflects() || is.transfer().reflects();
+        let surfaces = was.brdf() != is.brdf() || was.gradient_factor() != is.gradient_factor();
+        Self {
+            transfer: TransferDifference::between(was.transfer(), is.transfer()),
+            density: (was.density().to_bits() != is.density().to_bits())
+                .then(|| is.density() / was.density()),
+            phase: was.phase() != is.phase(),
+            surfaces: reflects && surfaces,
+            clip: was.clip() != is.clip(),
+            volume: !was.volume().is_same(is.volume()),
+            majorants: was.majorants().edge() != is.majorants().edge(),
+            lights: LightsDifference::between(old, new),
+            camera: old.camera != new.camera,
+            size: old.size != new.size,
+            background: old.background != new.background,
+            method: old.render.integrator != new.render.integrator
+                || old.render.max_scatter != new.render.max_scatter,
+            seed: old.render.seed != new.render.seed,
+        }
+    }
+
+    /// Whether nothing that light reads has changed.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        !(self.view() || self.light() || self.majorants || self.seed || !self.transfer.ior.is_empty())
+    }
+
+    /// Whether the rays that look, or what is done with them, are others.
+    #[must_use]
+    pub fn view(&self) -> bool {
+        self.camera || self.size || self.background || self.method
+    }
+
+    /// Whether light goes other ways through the matter, as long as it goes straight: all but the refractive index.
+    #[must_use]
+    pub fn light(&self) -> bool {
+        let Self { transfer, .. } = self;
+        let optics = [&transfer.opacity, &transfer.scattering, &transfer.emission];
+        optics.iter().any(|set| !set.is_empty())
+            || self.density.is_some()
+            || self.phase
+            || self.surfaces
+            || self.clip
+            || self.volume
+            || !self.lights.is_empty()
+    }
+}
+
+impl LightsDifference {
+    /// Lights are matched by name, and those without a match by their number.
+    fn between(old: &Scene, new: &Scene) -> Self {
+        let names = [old, new].map(|scene| &scene.light_names);
+        let named = |which: usize, name: &Option<String>| {
+            name.as_ref().and_then(|name| names[which].iter().position(|n| n.as_ref() == Some(name)))
+        };
+        let [was, is] = [old, new].map(|scene| scene.lights.lights());
+        let origins: Vec<LightOrigin> = (0..is.len())
+            .map(|i| {
+                // An old light whose name is still borne by another is that one.
+                let same_number = || (i < was.len() && named(1, &names[0][i]).is_none()).then_some(i);
+                match named(0, &names[1][i]).or_else(same_number) {
+                    Some(k) if was[k] == is[i] => LightOrigin::Same(k),
+                    Some(k) => LightOrigin::Changed(k),
+                    None => LightOrigin::New,
+                }
+            })
+            .collect();
+        let kept = |k| {
+            origins.iter().any(|o| matches!(*o, LightOrigin::Same(i) | LightOrigin::Changed(i) if i == k))
+        };
+        let removed = (0..was.len()).filter(|&k| !kept(k)).collect();
+        Self { origins, removed }
+    }
+
+    /// Whether all lights are as they were, and in the same order: methods that choose among them by number see no
+    /// difference.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        let in_place = |(i, origin): (usize, &LightOrigin)| *origin == LightOrigin::Same(i);
+        self.removed.is_empty() && self.origins.iter().enumerate().all(in_place)
+    }
+}
