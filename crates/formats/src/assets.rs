@@ -68,13 +68,52 @@ pub enum AssetError {
 /// [`AssetError`] names the file or key.
 pub fn load(document: &Document, folder: &Path) -> Result<(Assets, Source), AssetError> {
     let (volume, source) = volume(&document.volume, folder)?;
-    let interpolation = match document.volume.interpolation {
+    let volume = Arc::new(volume.with_interpolation(interpolation(document)));
+    let maps = maps(document, folder, &BTreeMap::new())?;
+    Ok((Assets { volume, maps }, source))
+}
+
+/// Reads what a document names that the one before an edit did not; the rest is shared with that one's assets.
+///
+/// # Errors
+/// [`AssetError`] names the file or key.
+pub fn reload(
+    document: &Document,
+    folder: &Path,
+    before: (&Document, &Assets),
+) -> Result<Assets, AssetError> {
+    let (old, assets) = before;
+    let interpolation = interpolation(document);
+    let same = document::Volume { interpolation: old.volume.interpolation, ..document.volume.clone() };
+    let volume = if same != old.volume {
+        Arc::new(volume(&document.volume, folder)?.0.with_interpolation(interpolation))
+    } else if assets.volume.interpolation() == interpolation {
+        assets.volume.clone()
+    } else {
+        Arc::new((*assets.volume).clone().with_interpolation(interpolation))
+    };
+    Ok(Assets { volume, maps: maps(document, folder, &assets.maps)? })
+}
+
+fn interpolation(document: &Document) -> Interpolation {
+    match document.volume.interpolation {
         document::Interpolation::Linear => Interpolation::Linear,
         document::Interpolation::Nearest => Interpolation::Nearest,
-    };
+    }
+}
+
+/// The environment maps of a document, by the paths that it gives; those that are known are not read again.
+fn maps(
+    document: &Document,
+    folder: &Path,
+    known: &BTreeMap<String, Arc<Map>>,
+) -> Result<BTreeMap<String, Arc<Map>>, AssetError> {
     let mut maps = BTreeMap::new();
     for (light, l) in document.lights.iter().flatten().enumerate() {
         let document::Light::Environment { map: Some(name), .. } = l else { continue };
+        if let Some(map) = known.get(name) {
+            maps.insert(name.clone(), map.clone());
+        }
         if !maps.contains_key(name) {
             let path = folder.join(name);
             let picture = read_map(&path).map_err(|source| AssetError::MapFile { light, source })?;
@@ -83,7 +122,7 @@ pub fn load(document: &Document, folder: &Path) -> Result<(Assets, Source), Asse
             maps.insert(name.clone(), Arc::new(map));
         }
     }
-    Ok((Assets { volume: Arc::new(volume.with_interpolation(interpolation)), maps }, source))
+    Ok(maps)
 }
 
 fn volume(
