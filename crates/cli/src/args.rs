@@ -38,6 +38,8 @@ pub struct Args {
 pub enum Command {
     /// Render a scene or a bare volume to pictures
     Render(Box<RenderOptions>),
+    /// Play a list of edits against a live session: how fast each is, and how much was computed again
+    Replay(Box<ReplayOptions>),
     /// Tell what the loader understands of a volume or of a scene's volume
     Info(InfoOptions),
     /// Measure this machine: speed as ratios, latency, growth
@@ -68,10 +70,6 @@ pub struct RenderOptions {
     #[arg(short, long = "output", value_name = "FILE")]
     pub outputs: Vec<PathBuf>,
 
-    /// Compute light by this method
-    #[arg(long, value_enum, value_name = "NAME", help_heading = "Scene")]
-    pub integrator: Option<Integrator>,
-
     /// Stop after N samples per pixel [default: the scene's, if no other stop is given]
     #[arg(long, value_name = "N", help_heading = "When to stop (the first met wins)",
           value_parser = value_parser!(u32).range(1..=MOST_SAMPLES))]
@@ -84,6 +82,61 @@ pub struct RenderOptions {
     /// Stop when the picture's relative error (noise) is at most E, e.g. 0.02
     #[arg(long, value_name = "E", help_heading = "When to stop (the first met wins)", value_parser = positive)]
     pub target_error: Option<f64>,
+
+    /// What is rendered.
+    #[command(flatten)]
+    pub scene: SceneOptions,
+
+    /// How it runs.
+    #[command(flatten)]
+    pub run: RunOptions,
+
+    /// Show progress even when standard error is no terminal
+    #[arg(long)]
+    pub progress: bool,
+
+    /// Print what is done and how long it takes
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
+}
+
+/// Options of `replay`.
+#[derive(Debug, Group)]
+pub struct ReplayOptions {
+    /// A scene (.toml, .json), a picture that Tyndall made, or a volume, as for `render`
+    #[arg(value_name = "SCENE")]
+    pub input: PathBuf,
+
+    /// A JSON list of edits, each { "name": ..., "patch": JSON Merge Patch on the scene document }
+    pub edits: PathBuf,
+
+    /// Render every edited scene from nothing as well, and compare times and pictures
+    #[arg(long)]
+    pub verify: bool,
+
+    /// Write the picture after the last edit to FILE, as `render` does; repeats
+    #[arg(short, long = "output", value_name = "FILE")]
+    pub outputs: Vec<PathBuf>,
+
+    /// Samples per pixel of the pictures that are compared or written [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=MOST_SAMPLES))]
+    pub samples: Option<u32>,
+
+    /// What is rendered.
+    #[command(flatten)]
+    pub scene: SceneOptions,
+
+    /// How it runs.
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
+/// Options that override the scene.
+#[derive(Debug, Group)]
+pub struct SceneOptions {
+    /// Compute light by this method
+    #[arg(long, value_enum, value_name = "NAME", help_heading = "Scene")]
+    pub integrator: Option<Integrator>,
 
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", value_parser = size, help_heading = "Scene")]
@@ -108,7 +161,11 @@ pub struct RenderOptions {
     /// VALUE is JSON, else a string. The other options win over it.
     #[arg(long, value_name = "PATH=VALUE", help_heading = "Scene")]
     pub set: Vec<String>,
+}
 
+/// Options that change no picture.
+#[derive(Debug, Group)]
+pub struct RunOptions {
     /// Threads [default: one per processor]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=MOST_THREADS))]
     pub threads: Option<u16>,
@@ -117,17 +174,9 @@ pub struct RenderOptions {
     #[arg(long, value_name = "FILE")]
     pub stats: Option<PathBuf>,
 
-    /// Show progress even when standard error is no terminal
-    #[arg(long)]
-    pub progress: bool,
-
     /// Print nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
-
-    /// Print what is done and how long it takes
-    #[arg(short, long, conflicts_with = "quiet")]
-    pub verbose: bool,
 }
 
 /// Options of `info`.

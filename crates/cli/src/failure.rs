@@ -25,6 +25,14 @@ impl Failure {
         Self::Usage(message.to_string())
     }
 
+    /// The same, said of a part of the input.
+    pub fn within(self, part: &str) -> Self {
+        match self {
+            Self::Input(message) => Self::Input(format!("{part}: {message}")),
+            other => other,
+        }
+    }
+
     /// What to print.
     pub fn message(&self) -> Option<&str> {
         match self {

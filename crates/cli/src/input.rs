@@ -1,7 +1,7 @@
 //! From INPUT and the options to a checked document and its assets.
 
 use crate::Failure;
-use crate::args::RenderOptions;
+use crate::args::SceneOptions;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use tyndall::message::{excerpt, place};
@@ -65,7 +65,7 @@ impl Input {
     }
 
     /// Lays the options over the document: `--set` in their order, then the others.
-    pub fn override_with(&mut self, options: &RenderOptions) -> Result<(), Failure> {
+    pub fn override_with(&mut self, options: &SceneOptions, samples: Option<u32>) -> Result<(), Failure> {
         for assignment in &options.set {
             document::set(&mut self.value, assignment)
                 .map_err(|e| Failure::usage(format!("--set {}: {e}", excerpt(assignment))))?;
@@ -74,7 +74,7 @@ impl Input {
         if let Some(integrator) = options.integrator {
             patch["render"]["integrator"] = integrator.name().into();
         }
-        if let Some(samples) = options.samples {
+        if let Some(samples) = samples {
             patch["render"]["samples"] = samples.into();
         }
         if let Some(seed) = options.seed {
@@ -100,11 +100,7 @@ impl Input {
     pub fn load(&mut self, path: &Path) -> Result<(Document, Assets, assets::Source), Failure> {
         let thickness_is_free = self.bare && self.value.pointer("/medium/density").is_none();
         let mut document = in_file(path, Document::from_value(self.value.take()))?;
-        let (assets, source) = assets::load(&document, &self.folder).map_err(|e| match e {
-            AssetError::Volume(_) => Failure::input(e),
-            // Of the others each begins with a key.
-            _ => Failure::input(format!("{}: {e}", place(path))),
-        })?;
+        let (assets, source) = assets::load(&document, &self.folder).map_err(|e| of_assets(&e, path))?;
         if thickness_is_free {
             document.medium.density = BARE_THICKNESS / assets.volume.grid().diagonal();
         }
@@ -112,12 +108,21 @@ impl Input {
     }
 }
 
+/// Why what a document names cannot be had.
+pub fn of_assets(error: &AssetError, document: &Path) -> Failure {
+    match error {
+        AssetError::Volume(_) => Failure::input(error),
+        // Of the others each begins with a key.
+        _ => Failure::input(format!("{}: {error}", place(document))),
+    }
+}
+
 /// Says of which file the trouble is.
-fn in_file<T>(path: &Path, result: Result<T, document::DocumentError>) -> Result<T, Failure> {
+pub fn in_file<T>(path: &Path, result: Result<T, document::DocumentError>) -> Result<T, Failure> {
     result.map_err(|e| Failure::input(format!("{}: {e}", place(path))))
 }
 
-fn read_text(path: &Path) -> Result<String, Failure> {
+pub fn read_text(path: &Path) -> Result<String, Failure> {
     let fail = |problem: &dyn std::fmt::Display| Failure::input(format!("{}: {problem}", place(path)));
     let unreadable = |e| fail(&format!("cannot be read: {e}; check the path"));
     let about = std::fs::metadata(path).map_err(unreadable)?;

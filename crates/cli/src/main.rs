@@ -2,13 +2,16 @@
 
 mod args;
 mod bench;
+mod edits;
 mod failure;
 mod info;
 mod input;
 mod lists;
+mod machine;
 mod output;
 mod progress;
 mod render;
+mod replay;
 mod stats;
 
 use args::{Args, Command};
@@ -24,6 +27,7 @@ fn main() -> ExitCode {
     let args = Args::try_parse().unwrap_or_else(|error| refuse(&error));
     let done = match args.command {
         Command::Render(options) => render::run(&options, started),
+        Command::Replay(options) => replay::run(&options),
         Command::Info(options) => info::run(&options),
         Command::Bench(options) => bench::run(&options),
         Command::Presets => lists::presets(),

@@ -3,20 +3,18 @@
 use crate::Failure;
 use crate::args::RenderOptions;
 use crate::input::Input;
+use crate::machine::{Interrupt, check_film, pool, vector_instructions};
 use crate::output;
 use crate::progress::Display;
 use crate::stats::{Stages, peak_memory};
 use serde_json::json;
 use std::io::Write;
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use tyndall::film::Film;
 use tyndall::message::{place, sentence};
 use tyndall::scene::Scene;
 use tyndall::session::{Budget, Session};
-use tyndall::simd::Level;
 
 /// How often progress is looked at.
 const SLICE: Duration = Duration::from_millis(100);
@@ -43,20 +41,20 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     };
     let mut stages = Stages::new(started);
     let interrupt = Interrupt::listen();
-    let threads = pool(options.threads)?;
+    let threads = pool(options.run.threads)?;
     let level = vector_instructions()?;
     let mut input = Input::open(&options.input)?;
     let places = output::places(&options.outputs, &options.input);
-    output::check(&places, options.stats.as_deref())?;
+    output::check(&places, options.run.stats.as_deref())?;
 
-    input.override_with(options)?;
+    input.override_with(&options.scene, options.samples)?;
     let (document, assets, source) = threads.install(|| input.load(&options.input))?;
     let load_s = stages.end("load");
-    refuse_film_that_does_not_fit(document.film.size, &options.input)?;
+    check_film(document.film.size, &options.input)?;
     let scene = threads
         .install(|| Scene::build(&document, &assets))
         .map_err(|e| Failure::input(format!("{}: {e}", place(&options.input))))?;
-    if !options.quiet {
+    if !options.run.quiet {
         for text in source.notes.iter().map(String::as_str).chain(scene.notes()) {
             drop(writeln!(std::io::stderr(), "tyndall: note: {}", sentence(text)));
         }
@@ -78,10 +76,10 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         usual_samples: document.render.samples.max(2),
     };
     interrupt.ask_from_now_on();
-    let display = Display::new(options.progress, options.quiet);
-    refine(&mut session, &stop, &interrupt.asked, display);
+    let display = Display::new(options.progress, options.run.quiet);
+    refine(&mut session, &stop, &interrupt.flag(), display);
     let rendered = stages.end("render");
-    let interrupted = interrupt.asked.load(Ordering::Relaxed);
+    let interrupted = interrupt.asked();
     if interrupted && session.film().mean_samples() == 0.0 {
         return Err(Failure::Interrupted);
     }
@@ -89,7 +87,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
 
     output::pictures(&places, session.film(), &document, &input.folder)?;
     stages.end("write");
-    if let Some(place) = &options.stats {
+    if let Some(place) = &options.run.stats {
         let film = session.film();
         let statistics = json!({
             "integrator": session.scene().render.integrator.name(),
@@ -155,65 +153,4 @@ fn refine(session: &mut Session, stop: &Stop, cancel: &Arc<AtomicBool>, mut disp
         display.show(share, film.mean_samples(), left, error);
     }
     display.finish();
-}
-
-/// The widest vector instructions, or those that `TYNDALL_SIMD` names.
-pub fn vector_instructions() -> Result<Level, Failure> {
-    match std::env::var_os("TYNDALL_SIMD") {
-        None => Ok(Level::best()),
-        Some(name) => name.to_string_lossy().parse().map_err(|e| {
-            Failure::usage(format!("TYNDALL_SIMD: {e}; name one of these, or unset it for the best"))
-        }),
-    }
-}
-
-fn pool(threads: Option<u16>) -> Result<Arc<rayon::ThreadPool>, Failure> {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads.map_or(0, usize::from))
-        .build()
-        .map(Arc::new)
-        .map_err(|e| Failure::usage(format!("--threads: {e}")))
-}
-
-/// Ctrl-C: ends the program at once while there is no picture to save, then asks for an early end, and
-/// the second time ends at once again.
-#[derive(Clone, Debug, Default)]
-struct Interrupt {
-    asks: Arc<AtomicBool>,
-    asked: Arc<AtomicBool>,
-}
-
-impl Interrupt {
-    fn listen() -> Self {
-        let interrupt = Self::default();
-        let heard = interrupt.clone();
-        // Without a handler Ctrl-C still ends the program, only without a picture.
-        drop(ctrlc::set_handler(move || {
-            if !heard.asks.load(Ordering::Relaxed) || heard.asked.swap(true, Ordering::Relaxed) {
-                let _nothing_half_written = tyndall_formats::atomic::abandon();
-                std::process::exit(130);
-            }
-        }));
-        interrupt
-    }
-
-    fn ask_from_now_on(&self) {
-        self.asks.store(true, Ordering::Relaxed);
-    }
-}
-
-fn refuse_film_that_does_not_fit(size: [u32; 2], input: &Path) -> Result<(), Failure> {
-    // The film, the picture with its layers, and the encoder's copy of it.
-    let needed = 3 * Film::bytes(size);
-    match tyndall_formats::memory::available() {
-        Some(available) if needed > available => Err(Failure::input(format!(
-            "{}: film.size: {} x {} pixels need {} MiB, but {} MiB are free; expected a smaller picture",
-            place(input),
-            size[0],
-            size[1],
-            needed >> 20,
-            available >> 20
-        ))),
-        _ => Ok(()),
-    }
 }

@@ -77,7 +77,7 @@ type Table = fn(&timing::Effort, tyndall::simd::Level) -> Result<Vec<Row>, Failu
 /// Runs the tables and prints each as soon as it is there, or all as JSON.
 pub fn run(options: &BenchOptions) -> Result<(), Failure> {
     let (BenchName::Core | BenchName::All) = options.name;
-    let level = crate::render::vector_instructions()?;
+    let level = crate::machine::vector_instructions()?;
     let effort = timing::Effort::new(options.quick);
     let mut all = Vec::new();
     let tables: [Table; 6] =

@@ -1,0 +1,65 @@
+//! Edits files: a JSON list of named merge patches.
+
+use crate::Failure;
+use crate::input::{in_file, read_text};
+use serde_json::Value;
+use std::path::Path;
+use tyndall::message::{excerpt, quoted};
+use tyndall::scene::document;
+
+/// One edit.
+pub struct Edit {
+    /// For reports; `edit 3` where the file gives none.
+    pub name: String,
+    /// A JSON Merge Patch on the scene document, a table.
+    pub patch: Value,
+}
+
+/// The edits of a file, not yet looked at one by one, so that those before a bad one are still played.
+pub fn read(path: &Path) -> Result<Vec<Value>, Failure> {
+    match in_file(path, document::value_from_json(&read_text(path)?))? {
+        Value::Array(edits) => Ok(edits),
+        other => Err(Failure::input(format!(
+            "{}: found {}, expected a list of edits: [{{\"name\": ..., \"patch\": {{...}}}}, ...]",
+            tyndall::message::place(path),
+            kind(&other)
+        ))),
+    }
+}
+
+impl Edit {
+    /// Reads the `number`-th edit, counted from 0; the error says what is wrong with it.
+    pub fn read(value: &Value, number: usize) -> Result<Self, String> {
+        let at = format!("edit {}", number + 1);
+        let expected = "expected {\"name\": ..., \"patch\": {...}}";
+        let table = value.as_object().ok_or_else(|| format!("{at}: found {}, {expected}", kind(value)))?;
+        if let Some(unknown) = table.keys().find(|key| !["name", "patch"].contains(&key.as_str())) {
+            return Err(format!("{at}: unknown key {}, {expected}", quoted(unknown)));
+        }
+        let name = match table.get("name") {
+            None => at.clone(),
+            Some(Value::String(name)) => name.clone(),
+            Some(other) => return Err(format!("{at}: `name`: found {}, expected a text", kind(other))),
+        };
+        let at = format!("{at} (`{}`)", excerpt(&name));
+        match table.get("patch") {
+            Some(patch @ Value::Object(_)) => Ok(Self { name, patch: patch.clone() }),
+            Some(other) => {
+                Err(format!("{at}: `patch`: found {}, expected a table of what changes", kind(other)))
+            }
+            None => Err(format!("{at}: no `patch`, {expected}")),
+        }
+    }
+}
+
+/// A JSON value in a word or two.
+fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::Null => "null",
+        Value::Bool(_) => "a truth value",
+        Value::Number(_) => "a number",
+        Value::String(_) => "a text",
+        Value::Array(_) => "a list",
+        Value::Object(_) => "a table",
+    }
+}

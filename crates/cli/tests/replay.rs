@@ -1,0 +1,151 @@
+//! `tyndall replay`: edits against a live session, their reports, and edits files that are none.
+
+mod fault;
+mod support;
+
+use fault::{Fault, SCENE};
+use serde_json::{Value, json};
+use support::{Ended, Folder};
+
+const CLOUD: &str = "\
+    volume.procedural = { kind = 'cloud', size = [12, 12, 12] }\n\
+    transfer_function.points = [{ value = 0.1, opacity = 0 }, { value = 1, opacity = 1 }]\n\
+    medium.density = 0.5\n\
+    film.size = [16, 16]\n\
+    render.samples = 3\n";
+
+fn with(edits: &Value) -> Folder {
+    let folder = Folder::new();
+    folder.put("scene.toml", CLOUD);
+    folder.put("edits.json", edits.to_string());
+    folder
+}
+
+/// The statistics of a replay with further options, whatever its status.
+fn replay(folder: &Folder, options: &[&str]) -> (Value, Ended) {
+    let arguments = ["replay", "../scene.toml", "../edits.json", "--stats", "s.json"];
+    let ended = folder.run(&[&arguments, options].concat());
+    let text = std::fs::read(folder.at("out/s.json")).unwrap_or_else(|e| panic!("{e}: {}", ended.stderr));
+    (serde_json::from_slice(&text).expect("JSON"), ended)
+}
+
+fn edits() -> Value {
+    json!([
+        { "name": "thicker", "patch": { "medium": { "density": 0.8 } } },
+        { "name": "brighter", "patch": { "film": { "exposure": 1 } } },
+        { "patch": { "transfer_function": { "points": [{ "value": 0.3, "opacity": 0.5 }] } } },
+        { "name": "wider", "patch": { "film": { "size": [20, 12] } } },
+        { "name": "blocks", "patch": { "volume": { "interpolation": "nearest" } } },
+        { "name": "another volume", "patch": { "volume": { "procedural": { "kind": "shells" } } } },
+        { "name": "sky", "patch": { "lights": [{ "type": "environment", "radiance": 1 }] } },
+        { "name": "more samples", "patch": { "render": { "samples": 5 } } },
+        { "name": "another method", "patch": { "render": { "integrator": "raymarch" } } },
+        { "name": "fewer samples", "patch": { "render": { "samples": 2 } } },
+    ])
+}
+
+#[test]
+fn every_edit_is_reported_and_equals_a_render_from_nothing() {
+    for integrator in ["path", "raymarch"] {
+        let folder = with(&edits());
+        let (told, ended) = replay(&folder, &["--verify", "--integrator", integrator]);
+        assert_eq!((ended.status, ended.stderr.as_str()), (Some(0), ""));
+        let reports = told["edits"].as_array().expect("a list");
+        let names: Vec<_> = reports.iter().map(|r| r["name"].as_str().expect("a name")).collect();
+        assert_eq!(names[..4], ["thicker", "brighter", "edit 3", "wider"]);
+        let redone: Vec<_> =
+            reports.iter().map(|r| r["recomputed"]["pixels"].as_f64().expect("a share")).collect();
+        let method = if integrator == "path" { 1.0 } else { 0.0 };
+        assert_eq!(redone, [1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, method, 0.0], "{told}");
+        for report in reports {
+            assert_eq!(
+                (&report["max_abs_diff"], &report["false_negatives"]),
+                (&json!(0.0), &json!(0)),
+                "{report}"
+            );
+            let [latency, scratch, speedup] =
+                ["latency_s", "scratch_s", "speedup"].map(|key| report[key].as_f64().expect("a number"));
+            assert!(latency > 0.0 && scratch > 0.0 && (speedup - scratch / latency).abs() < 1e-6 * speedup);
+        }
+        // The sky behind the cloud is redone for nothing when the cloud gets thicker, but not where sizes differ.
+        assert!(reports[0]["false_positives"].as_u64() > Some(0), "{told}");
+        assert_eq!(reports[3]["false_positives"], Value::Null);
+        let table = String::from_utf8(ended.stdout).expect("text");
+        assert_eq!(table.lines().count(), 1 + reports.len(), "{table}");
+        assert!(table.contains("another volume"), "{table}");
+    }
+}
+
+#[test]
+fn without_verify_nothing_is_rendered_twice() {
+    let (told, ended) = replay(&with(&edits()), &["-q"]);
+    assert_eq!((ended.status, ended.stderr.as_str(), ended.stdout.as_slice()), (Some(0), "", &b""[..]));
+    let report = &told["edits"][0];
+    assert!(report["latency_s"].is_f64() && report.get("scratch_s").is_none(), "{report}");
+    assert_eq!((&told["integrator"], &told["size"]), (&json!("raymarch"), &json!([20, 12])));
+}
+
+#[test]
+fn the_last_picture_is_that_of_the_edited_scene() {
+    let folder = with(&json!([{ "patch": { "medium": { "density": 2 } } }]));
+    for arguments in [
+        &["replay", "../scene.toml", "../edits.json", "-o", "a.png"][..],
+        &["render", "../scene.toml", "--set", "medium.density=2", "-o", "b.png"],
+        &["render", "../scene.toml", "-o", "c.png"],
+    ] {
+        assert_eq!(folder.run(arguments).status, Some(0));
+    }
+    let [a, b, c] =
+        ["a.png", "b.png", "c.png"].map(|name| std::fs::read(folder.at("out").join(name)).expect("a file"));
+    assert!(a == b && a != c);
+}
+
+#[test]
+fn a_bad_edit_keeps_the_reports_before_it() {
+    for (bad, says) in [
+        (json!({ "name": "x", "patch": { "medium": { "densty": 1 } } }), "medium.densty"),
+        (json!({ "name": "x", "patch": { "volume": { "path": "no-such.nrrd" } } }), "no-such.nrrd"),
+        (json!({ "name": "x", "patch": { "medium": { "density": 1e30 } } }), "medium.density"),
+        (json!({ "name": "x", "patch": 3 }), "`patch`: found a number"),
+        (json!({ "name": "x" }), "no `patch`"),
+        (json!({ "name": 3, "patch": {} }), "`name`: found a number"),
+        (json!({ "name": "x", "patch": {}, "patsch": {} }), "unknown key \"patsch\""),
+        (json!([]), "found a list"),
+    ] {
+        let folder = with(&json!([{ "patch": {} }, bad, { "patch": {} }]));
+        let (told, ended) = replay(&folder, &[]);
+        assert_eq!(ended.status, Some(1), "{}", ended.stderr);
+        assert_eq!(told["edits"].as_array().map(Vec::len), Some(1), "{told}");
+        let message = &ended.stderr;
+        assert!(message.lines().count() == 1 && message.contains("edits.json: edit 2"), "{message}");
+        assert!(message.contains(says), "`{says}` is not in {message}");
+    }
+}
+
+#[test]
+fn what_is_no_edits_file_is_told_before_the_work() {
+    let mut deep = "[".repeat(100_000);
+    deep.push_str(&"]".repeat(100_000));
+    for (edits, says) in [
+        (&b""[..], "edits.json: "),
+        (b"{}", "expected a list of edits"),
+        (b"3", "expected a list of edits"),
+        (b"[{]", "line 1"),
+        (b"[{\"patch\": {}}", "edits.json: "),
+        (b"\xff\xfe", "no UTF-8"),
+        (deep.as_bytes(), "edits.json: "),
+    ] {
+        let files = vec![("scene.toml", SCENE.into()), ("edits.json", edits.to_vec())];
+        let arguments = vec!["replay", "../scene.toml", "../edits.json"];
+        Fault { files, arguments, status: 1, says: vec![says] }.check();
+    }
+    let files = || vec![("scene.toml", SCENE.into())];
+    for (arguments, status, says) in [
+        (vec!["replay", "../scene.toml", "../none.json"], 1, "none.json"),
+        (vec!["replay", "../scene.toml", ".."], 1, "not a file"),
+        (vec!["replay", "../scene.toml"], 2, "<EDITS>"),
+        (vec!["replay", "../scene.toml", "../e.json", "-o", "a.gif"], 2, "a.gif"),
+    ] {
+        Fault { files: files(), arguments, status, says: vec![says] }.check();
+    }
+}
