@@ -7,7 +7,6 @@ use crate::simd::Level;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Instant;
 
 /// When a slice of work ends; the first limit met counts.
@@ -115,39 +114,23 @@ impl Session {
     /// as early as can be. Every sample follows from its pixel and number, so threads and slices leave
     /// no trace in the bits.
     pub fn refine(&mut self, budget: &Budget) -> Progress {
-        let stop = Stop::when(budget.cancel.clone());
-        std::thread::scope(|scope| {
-            let (done, watched) = mpsc::channel::<()>();
-            if let Some(deadline) = budget.deadline {
-                let stop = stop.clone();
-                scope.spawn(move || {
-                    let left = deadline.saturating_duration_since(Instant::now());
-                    if watched.recv_timeout(left) == Err(RecvTimeoutError::Timeout) {
-                        stop.expire();
-                    }
-                });
-            }
-            self.refine_until(budget.samples, &stop);
-            drop(done);
-        });
-        self.progress()
-    }
-
-    fn refine_until(&mut self, samples: u32, stop: &Stop) {
+        let stop = || Stop::when(&budget.cancel, budget.deadline);
         let (scene, integrator) = (&self.scene, &self.integrator);
-        while self.film.samples() < samples && !stop.reached() {
+        while self.film.samples() < budget.samples && !stop().reached() {
             // Several passes at once, as soon as that delays no picture much, spare threads the waiting for each other.
             let so_far = self.film.samples();
-            let pass = so_far.saturating_add((so_far / 4).clamp(1, 16)).min(samples);
+            let pass = so_far.saturating_add((so_far / 4).clamp(1, 16)).min(budget.samples);
             let tiles = self.film.tiles_mut().par_iter_mut().zip(&mut self.pending).with_max_len(1);
             self.threads.install(|| {
                 tiles.for_each(|(tile, pending)| {
+                    let stop = stop();
                     if !stop.reached() {
-                        integrator.refine(scene, tile, pending, pass, stop);
+                        integrator.refine(scene, tile, pending, pass, &stop);
                     }
                 });
             });
         }
+        self.progress()
     }
 
     /// How far it is.

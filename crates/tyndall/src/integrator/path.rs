@@ -55,7 +55,7 @@ struct Refine<'a> {
     tile: &'a mut Tile,
     pending: &'a mut Option<Walk>,
     samples: u32,
-    stop: &'a Stop,
+    stop: &'a Stop<'a>,
 }
 
 impl Kernel for Refine<'_> {
@@ -88,7 +88,7 @@ impl Kernel for Trace<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(mut self, simd: S) -> PixelSample {
-        while !self.walk.go_on(simd, self.scene, &Stop::default()) {}
+        while !self.walk.go_on(simd, self.scene, &Stop::never()) {}
         self.walk.seen
     }
 }

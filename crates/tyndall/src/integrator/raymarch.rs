@@ -66,7 +66,8 @@ impl RayMarch {
     #[inline(always)]
     fn go_on<S: Lanes>(&self, simd: S, scene: &Scene, packet: &mut Packet, stop: &Stop) -> bool {
         let medium = &*scene.medium;
-        let (shines, glows) = (scene.render.max_scatter > 0, medium.transfer().emits());
+        let shines = scene.render.max_scatter > 0;
+        let glowing = if medium.transfer().emits() { packet.count } else { 0 };
         let most = S::f32s::splat(simd, 1.0 - OPAQUE);
         let mut alpha = S::f32s::from_slice(simd, &packet.alpha[..S::WIDTH]);
         let mut depth = S::f32s::from_slice(simd, &packet.depth[..S::WIDTH]);
@@ -79,39 +80,42 @@ impl RayMarch {
             let Some(sample) = march.next() else { break };
             // The sum of all shares so far leaves this transmittance.
             let covered = one_minus_exp(simd, sample.thickness) * (-alpha + 1.0);
-            for lane in packet.shaded..packet.count {
-                let covered = covered.as_slice()[lane];
-                if !shines || covered <= 0.0 {
-                    continue;
+            if shines {
+                for lane in packet.shaded..packet.count {
+                    let covered = covered.as_slice()[lane];
+                    if covered <= 0.0 {
+                        continue;
+                    }
+                    if moved && stop.reached() {
+                        // The same sample comes again, of which some lanes are shaded already.
+                        packet.shaded = lane;
+                        packet.keep::<S>(k, alpha, depth);
+                        return false;
+                    }
+                    let [x, y, z] = sample.place;
+                    let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
+                    let w_out = -packet.rays[lane].direction;
+                    let source = self.source(simd, scene, place, sample.value.as_slice()[lane], w_out);
+                    packet.radiance[lane] += source * covered;
+                    moved = true;
                 }
+            } else {
                 if moved && stop.reached() {
-                    // The same sample comes again, of which some lanes are shaded already.
-                    packet.shaded = lane;
-                    k.store_slice(&mut packet.k[..S::WIDTH]);
-                    alpha.store_slice(&mut packet.alpha[..S::WIDTH]);
-                    depth.store_slice(&mut packet.depth[..S::WIDTH]);
+                    packet.keep::<S>(k, alpha, depth);
                     return false;
                 }
-                let [x, y, z] = sample.place;
-                let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
-                let w_out = -packet.rays[lane].direction;
-                let source = self.source(simd, scene, place, sample.value.as_slice()[lane], w_out);
-                packet.radiance[lane] += source * covered;
-                moved = true;
-            }
-            if !shines && glows {
-                for lane in 0..packet.count {
+                for lane in 0..glowing {
                     let emitted = medium.transfer().emitted(sample.value.as_slice()[lane]);
                     packet.radiance[lane] += emitted * covered.as_slice()[lane];
                 }
+                moved = true;
             }
             packet.shaded = 0;
             alpha += covered;
             depth += sample.t * covered;
             march.active &= alpha.simd_lt(most);
         }
-        alpha.store_slice(&mut packet.alpha[..S::WIDTH]);
-        depth.store_slice(&mut packet.depth[..S::WIDTH]);
+        packet.keep::<S>(march.step(), alpha, depth);
         true
     }
 
@@ -183,6 +187,14 @@ impl Packet {
         packet
     }
 
+    /// Where the march stands, and what it has met.
+    #[inline(always)]
+    fn keep<S: Lanes>(&mut self, k: S::i32s, alpha: S::f32s, depth: S::f32s) {
+        k.store_slice(&mut self.k[..S::WIDTH]);
+        alpha.store_slice(&mut self.alpha[..S::WIDTH]);
+        depth.store_slice(&mut self.depth[..S::WIDTH]);
+    }
+
     /// What a ray has found in the end.
     fn sample(&self, scene: &Scene, lane: usize) -> PixelSample {
         let (alpha, direction) = (self.alpha[lane], self.rays[lane].direction);
@@ -201,7 +213,7 @@ struct Refine<'a> {
     tile: &'a mut Tile,
     pending: &'a mut Option<Box<Packet>>,
     samples: u32,
-    stop: &'a Stop,
+    stop: &'a Stop<'a>,
 }
 
 impl Kernel for Refine<'_> {
@@ -240,7 +252,7 @@ impl Kernel for March<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(mut self, simd: S) -> PixelSample {
-        while !self.raymarch.go_on(simd, self.scene, &mut self.packet, &Stop::default()) {}
+        while !self.raymarch.go_on(simd, self.scene, &mut self.packet, &Stop::never()) {}
         self.packet.sample(self.scene, 0)
     }
 }

@@ -33,15 +33,14 @@ impl ValueBins {
         self.per_half.is_normal()
     }
 
-    /// The bin of a value, plus the place in it from 0 to 1; never falls as values rise. Lanes compute the same by
-    /// [`Self::numbers`].
+    /// The bin of a value, plus the place in it from 0 to 1; never falls as values rise.
     #[inline]
     #[must_use]
     pub fn place(self, value: f32) -> f32 {
         self.unbounded(value).max(0.0).min((Self::COUNT - 1) as f32)
     }
 
-    /// What [`Self::place`] subtracts from half a value and then multiplies it by, before it adds 1 and clamps; each
+    /// For lanes, which compute the same: what [`Self::place`] subtracts from half a value and then multiplies it by, before it adds 1 and clamps; each
     /// operation rounds.
     #[inline]
     pub(crate) fn numbers(self) -> [f32; 2] {

@@ -43,8 +43,11 @@ fn picture(scene: &Scene, threads: usize, slice: Option<Duration>) -> Image {
 
 #[test]
 fn threads_and_slices_leave_no_trace() {
-    for kind in [IntegratorKind::Path, IntegratorKind::RayMarch { step: 0.5, light_samples: 4 }] {
-        let scene = scene(kind);
+    let march = |step| IntegratorKind::RayMarch { step, light_samples: 4 };
+    // Without scattering a march stops between samples, of which it then takes many.
+    for (kind, max_scatter) in [(IntegratorKind::Path, 8), (march(0.5), 8), (march(0.01), 0)] {
+        let mut scene = scene(kind);
+        scene.render.max_scatter = max_scatter;
         let one = picture(&scene, 1, None);
         assert!(one.rgba.iter().any(|p| p[3] > 0.0) && one.rgba.iter().any(|p| p[3] < 1.0));
         assert_eq!(one, picture(&scene, 2, None));
