@@ -2,6 +2,7 @@
 
 use super::Scene;
 use crate::transfer::TransferDifference;
+use std::collections::HashMap;
 
 /// What of one scene is no longer so in another, by what light reads. What only shows pictures (exposure, tone) or stops
 /// them (samples) is no part of a scene and never differs.
@@ -113,27 +114,23 @@ impl Difference {
 impl LightsDifference {
     /// Lights are matched by name, and those without a match by their number.
     fn between(old: &Scene, new: &Scene) -> Self {
-        let names = [old, new].map(|scene| &scene.light_names);
-        let named = |which: usize, name: &Option<String>| {
-            name.as_ref().and_then(|name| names[which].iter().position(|n| n.as_ref() == Some(name)))
-        };
         let [was, is] = [old, new].map(|scene| scene.lights.lights());
-        let origins: Vec<LightOrigin> = (0..is.len())
+        let [old_names, new_names] = [old, new].map(|scene| &scene.light_names);
+        let [old_numbers, new_numbers] = [old_names, new_names].map(|names| numbers(names));
+        let mut gone = vec![true; was.len()];
+        let origins = (0..is.len())
             .map(|i| {
-                // An old light whose name is still borne by another is that one.
-                let same_number = || (i < was.len() && named(1, &names[0][i]).is_none()).then_some(i);
-                match named(0, &names[1][i]).or_else(same_number) {
-                    Some(k) if was[k] == is[i] => LightOrigin::Same(k),
-                    Some(k) => LightOrigin::Changed(k),
-                    None => LightOrigin::New,
-                }
+                let of_name = new_names[i].as_ref().and_then(|name| old_numbers.get(name).copied());
+                // An old light whose name is still borne is the one that bears it.
+                let borne =
+                    |i: usize| old_names[i].as_ref().is_some_and(|name| new_numbers.contains_key(name));
+                let of_number = || (i < was.len() && !borne(i)).then_some(i);
+                let Some(k) = of_name.or_else(of_number) else { return LightOrigin::New };
+                gone[k] = false;
+                if was[k] == is[i] { LightOrigin::Same(k) } else { LightOrigin::Changed(k) }
             })
             .collect();
-        let kept = |k| {
-            origins.iter().any(|o| matches!(*o, LightOrigin::Same(i) | LightOrigin::Changed(i) if i == k))
-        };
-        let removed = (0..was.len()).filter(|&k| !kept(k)).collect();
-        Self { origins, removed }
+        Self { origins, removed: (0..was.len()).filter(|&k| gone[k]).collect() }
     }
 
     /// Whether all lights are as they were, and in the same order: methods that choose among them by number see no
@@ -143,4 +140,9 @@ impl LightsDifference {
         let in_place = |(i, origin): (usize, &LightOrigin)| *origin == LightOrigin::Same(i);
         self.removed.is_empty() && self.origins.iter().enumerate().all(in_place)
     }
+}
+
+/// The first light of each name.
+fn numbers(names: &[Option<String>]) -> HashMap<&String, usize> {
+    names.iter().enumerate().rev().filter_map(|(i, name)| Some((name.as_ref()?, i))).collect()
 }

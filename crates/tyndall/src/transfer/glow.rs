@@ -71,7 +71,8 @@ mod tests {
             },
         };
         let smooth = vec![point(0.0, 0.0, 0.0), point(1024.0, 1.0, 5.0)];
-        // Jumps in the middle and at the border of a bin, and a bend too strong for a line.
+        // Jumps in the middle and at the border of a bin, a bend too strong for a line, and a spike beside the places
+        // where a line is tried.
         let rough = vec![
             point(0.0, 0.9, 0.1),
             point(99.5, 0.9, 0.1),
@@ -80,6 +81,10 @@ mod tests {
             point(200.0, 0.5, 1.0),
             point(300.0, 0.0, 0.0),
             point(303.0, 1.0, 5.0),
+            point(500.1, 1.0, 5.0),
+            point(500.1, 0.0, 5.0),
+            point(500.3, 0.0, 5.0),
+            point(500.3, 1.0, 5.0),
         ];
         for points in [smooth, rough] {
             let function = TransferFunction::over(ValueBins::new([0.0, 1024.0]), points).unwrap();
@@ -87,7 +92,8 @@ mod tests {
             for i in 0..21_000_u16 {
                 let value = f32::from(i) * 0.05 - 10.0;
                 let (found, exact) = (function.emitted(value).r, function.optics(value).emitted().r);
-                assert!((found - exact).abs() < 5e-4 * 5.0, "{found}, exactly {exact} at {value}");
+                // A bend and the rounding of a place, 2^-14 of a bin, over which emission may rise by a third.
+                assert!((found - exact).abs() < 1.5e-4 * 5.0, "{found}, exactly {exact} at {value}");
                 from_table += usize::from(function.glow.as_ref().unwrap().emitted(value).is_some());
             }
             assert!(from_table > 15_000, "{from_table}");

@@ -2,7 +2,7 @@
 //!
 //! Piecewise linear between points, clamped outside them; two points at one value are a jump, of
 //! which the later holds from there. All optics are evaluated segment by segment, which a small index finds in
-//! constant time; the opacity alone, which is read most, also from a table that agrees with them but for rounding.
+//! constant time; opacity and emission, which are read most, also from tables that agree with them but for rounding.
 
 mod difference;
 mod glow;

@@ -132,6 +132,10 @@ mod tests {
         TransferFunction::new(points.iter().map(point).collect()).unwrap()
     }
 
+    fn over(range: [f32; 2], points: &[(f32, f32)]) -> TransferFunction {
+        TransferFunction::over(ValueBins::new(range), function(points).points().to_vec()).unwrap()
+    }
+
     fn functions() -> Vec<TransferFunction> {
         let mut random = SplitMix::new(9);
         // Steps of 1/8 as in 8-bit data, jumps at data values, and points too near each other for the bins.
@@ -147,6 +151,12 @@ mod tests {
             function(&[&[(-3.0, 0.5)], &close[..], &[(7.0, 0.5)]].concat()),
             function(&many),
             function(&[(-3e38, 0.0), (0.0, 1.0), (3e38, 0.5)]),
+            // In bins of data that the points reach past, on both sides, on one, and lie wholly beside.
+            over([0.25, 0.75], &[(-1.0, 0.9), (0.3, 0.1), (0.5, 0.6), (2.0, 0.2), (3.0, 1.0)]),
+            over([0.25, 0.75], &[(0.5, 0.0), (0.7, 0.5), (9.0, 0.5)]),
+            over([0.25, 0.75], &[(1.0, 0.2), (1.5, 0.8), (1.5, 0.1)]),
+            over([0.25, 0.75], &[(-1.0, 0.2), (-0.5, 0.8)]),
+            over([1.0, 1.0], &[(0.0, 0.2), (2.0, 0.8)]),
         ]
     }
 
