@@ -2,12 +2,14 @@
 
 use divan::{Bencher, black_box};
 use std::sync::Arc;
-use tyndall::math::{Ray, Vec3};
+use tyndall::light::{Directional, Enclosure, Environment, Light, PointLight, Rect, SphereLight};
+use tyndall::math::{Ray, Rgb, Vec3};
 use tyndall::medium::{Medium, MediumSettings, Track};
 use tyndall::sampling::{PathSampler, Stream};
 use tyndall::scattering::{Brdf, Phase};
 use tyndall::simd::Level;
 use tyndall::transfer::{Optics, Point, TransferFunction};
+use tyndall::volume::Grid;
 use tyndall::volume::procedural::{Field, Kind};
 
 fn main() {
@@ -94,4 +96,21 @@ fn optical_thickness(bencher: Bencher, level: Level) {
     bencher
         .with_inputs(next)
         .bench_local_values(|track| medium.optical_thickness(level, &track, 0.5, f32::INFINITY));
+}
+
+#[divan::bench(args = ["point", "sun", "rect", "sphere", "sky"])]
+fn emit(bencher: Bencher, kind: &str) {
+    let grid = Grid::centred([128; 3], [1.0; 3]).expect("a plain size");
+    let box_ = Enclosure::new(&grid);
+    let at = Vec3::new(150.0, 200.0, 90.0);
+    let light = match kind {
+        "point" => Light::Point(PointLight { position: at, intensity: Rgb::WHITE }),
+        "sun" => Light::Directional(Directional::new(-at, Rgb::WHITE, 0.0)),
+        "rect" => Light::Rect(Rect::new(at, -at, Vec3::X, [50.0, 20.0], Rgb::WHITE)),
+        "sphere" => Light::Sphere(SphereLight { middle: at, radius: 30.0, radiance: Rgb::WHITE }),
+        _ => Light::Environment(Environment::constant(Rgb::WHITE, true)),
+    };
+    let mut stream = Stream::new(9, [0, 0, 1]);
+    let numbers = || [(); 4].map(|()| stream.uniform());
+    bencher.with_inputs(numbers).bench_local_values(|u| light.emit(&box_, u));
 }

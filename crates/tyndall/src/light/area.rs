@@ -1,7 +1,7 @@
 //! Shining rectangles, disks and spheres.
 
-use super::{LightSample, Passed, Target, strength_of_area};
-use crate::math::{Frame, Ray, Rgb, Vec3};
+use super::{Emitted, Enclosure, LightSample, Passed, Target, strength_of_area};
+use crate::math::{Frame, Ray, Rgb, Vec3, cast};
 use crate::sampling::warp;
 use std::f32::consts::PI;
 
@@ -59,12 +59,30 @@ impl Rect {
         self.size[0] * self.size[1]
     }
 
+    /// Uniform by area.
+    #[inline]
+    fn point(&self, u: [f32; 2]) -> Vec3 {
+        self.middle
+            + self.frame.u * ((u[0] - 0.5) * self.size[0])
+            + self.frame.v * ((u[1] - 0.5) * self.size[1])
+    }
+
     #[inline]
     pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let point = self.middle
-            + self.frame.u * ((u[0] - 0.5) * self.size[0])
-            + self.frame.v * ((u[1] - 0.5) * self.size[1]);
-        flat_sample(from, point, self.frame.w, self.area(), self.radiance)
+        flat_sample(from, self.point(u), self.frame.w, self.area(), self.radiance)
+    }
+
+    pub(super) fn emit(&self, into: &Enclosure, u: [f32; 4]) -> Option<Emitted> {
+        let point = self.point([u[2], u[3]]);
+        Emitted::from_surface(into, point, self.frame.w, self.area(), [u[0], u[1]])
+    }
+
+    pub(super) fn color(&self) -> Rgb {
+        self.radiance
+    }
+
+    pub(super) fn colored(self, radiance: Rgb) -> Self {
+        Self { radiance, ..self }
     }
 
     #[inline]
@@ -101,11 +119,29 @@ impl Disk {
         PI * self.radius * self.radius
     }
 
+    /// Uniform by area.
+    #[inline]
+    fn point(&self, u: [f32; 2]) -> Vec3 {
+        let [x, y] = warp::disk(u).map(|c| c * self.radius);
+        self.middle + self.frame.u * x + self.frame.v * y
+    }
+
     #[inline]
     pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let [x, y] = warp::disk(u).map(|c| c * self.radius);
-        let point = self.middle + self.frame.u * x + self.frame.v * y;
-        flat_sample(from, point, self.frame.w, self.area(), self.radiance)
+        flat_sample(from, self.point(u), self.frame.w, self.area(), self.radiance)
+    }
+
+    pub(super) fn emit(&self, into: &Enclosure, u: [f32; 4]) -> Option<Emitted> {
+        let point = self.point([u[2], u[3]]);
+        Emitted::from_surface(into, point, self.frame.w, self.area(), [u[0], u[1]])
+    }
+
+    pub(super) fn color(&self) -> Rgb {
+        self.radiance
+    }
+
+    pub(super) fn colored(self, radiance: Rgb) -> Self {
+        Self { radiance, ..self }
     }
 
     #[inline]
@@ -170,6 +206,20 @@ impl SphereLight {
         }
         let distance = self.nearest(ray)?;
         Some(Passed { distance, radiance: self.radiance, pdf: 1.0 / (2.0 * PI * cap) })
+    }
+
+    /// From the cap of points whose outward side sees the ball around the box, and so any of the box.
+    pub(super) fn emit(&self, into: &Enclosure, u: [f32; 4]) -> Option<Emitted> {
+        let (center, radius) = into.ball();
+        let to_box = center - self.middle.as_dvec3();
+        let distance = to_box.length();
+        let lowest = cast::single((f64::from(self.radius) - radius) / distance).clamp(-1.0, 1.0);
+        let toward = if distance > 0.0 { (to_box / distance).as_vec3() } else { Vec3::Z };
+        let normal = Frame::around(toward).to_world(warp::cone([u[2], u[3]], lowest)).normalize();
+        let area = 2.0 * PI * self.radius * self.radius * (1.0 - lowest);
+        let point = self.middle + normal * self.radius;
+        // Around the whole box it lights none of it; with the same ball, `lowest` is no number.
+        if area > 0.0 { Emitted::from_surface(into, point, normal, area, [u[0], u[1]]) } else { None }
     }
 
     pub(super) fn strength(&self, target: &Target) -> f64 {

@@ -1,6 +1,6 @@
 //! Light from one direction, or from a cone around it.
 
-use super::{LightSample, Passed};
+use super::{Emitted, Enclosure, LightSample, Passed};
 use crate::math::{Frame, Ray, Rgb, Vec3};
 use crate::sampling::warp;
 use std::f32::consts::PI;
@@ -45,15 +45,40 @@ impl Directional {
     #[inline]
     pub(super) fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
         let distance = f32::INFINITY;
+        let direction = self.toward(u);
         if self.is_sharp() {
-            let direction = self.frame.w;
             return Some(LightSample { direction, distance, radiance: self.irradiance, pdf: distance });
+        }
+        Some(LightSample { direction, distance, radiance: self.radiance() / self.pdf(), pdf: self.pdf() })
+    }
+
+    /// Direction to the light, uniform in its cone.
+    #[inline]
+    fn toward(&self, u: [f32; 2]) -> Vec3 {
+        if self.is_sharp() {
+            return self.frame.w;
         }
         let drop = u[0] * self.cap;
         let sin = (drop * (2.0 - drop)).sqrt();
         let turn = warp::around_z(0.0, u[1]) * sin;
-        let direction = self.frame.to_world(turn.with_z(1.0 - drop)).normalize();
-        Some(LightSample { direction, distance, radiance: self.radiance() / self.pdf(), pdf: self.pdf() })
+        self.frame.to_world(turn.with_z(1.0 - drop)).normalize()
+    }
+
+    /// Evenly over the silhouette of the box.
+    pub(super) fn emit(&self, into: &Enclosure, u: [f32; 4]) -> Option<Emitted> {
+        let travel = -self.toward([u[2], u[3]]);
+        let (ray, area) = into.cross(travel.as_dvec3(), [u[0], u[1]])?;
+        // Radiance over density, per irradiance; the irradiance itself when sharp.
+        let share = 2.0 / (2.0 - f64::from(self.cap));
+        Some(Emitted::evenly(ray, share * area))
+    }
+
+    pub(super) fn color(&self) -> Rgb {
+        self.irradiance
+    }
+
+    pub(super) fn colored(self, irradiance: Rgb) -> Self {
+        Self { irradiance, ..self }
     }
 
     #[inline]

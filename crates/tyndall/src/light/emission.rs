@@ -1,11 +1,12 @@
 //! Glowing matter as a light: a point of it is drawn by power, so that a small bright spot is found.
 
-use super::{LightSample, Target};
-use crate::math::{Bounds, Vec3};
+use super::{Emitted, LightSample, Target};
+use crate::math::{Bounds, Ray, Rgb, Vec3};
 use crate::medium::Medium;
-use crate::sampling::{Discrete, Stream};
+use crate::sampling::{Discrete, Stream, warp};
 use crate::volume::Cells;
 use rayon::prelude::*;
+use std::f32::consts::PI;
 use std::sync::Arc;
 
 /// Voxels along the edge of a cell that points are drawn from: small, since a point is drawn evenly in it
@@ -15,6 +16,17 @@ const CELL: usize = 4;
 /// Share of a cell's weight that is the upper bound of what it emits, the rest being what its voxels show:
 /// what glows between the voxels is found too, and cells that only might glow are seldom asked.
 const CAUTION: f32 = 0.1;
+
+/// A point of glowing matter, drawn by power.
+struct Glow {
+    /// Index space.
+    place: Vec3,
+    sigma_t: f32,
+    /// Emitted radiance per world unit of length.
+    emitted: Rgb,
+    /// Density of the place, per world volume.
+    per_volume: f32,
+}
 
 /// Glowing cells of a medium, weighted by what they emit.
 #[derive(Clone, Debug)]
@@ -63,29 +75,48 @@ impl Emission {
     /// of finding it can be weighed.
     #[must_use]
     pub fn sample(&self, medium: &Medium, from: Vec3, stream: &mut Stream) -> Option<LightSample> {
-        let (i, chance, _) = self.cells.sample(stream.uniform());
-        let b = &self.bounds[i];
+        let choice = stream.uniform();
         let u = Vec3::new(stream.uniform(), stream.uniform(), stream.uniform());
+        let glow = self.glow(medium, choice, u)?;
+        let to_light = medium.volume().grid().index_to_world(glow.place) - from;
+        let squared = to_light.length_squared();
+        if squared == 0.0 {
+            return None;
+        }
+        let distance = squared.sqrt();
+        Some(LightSample {
+            direction: to_light / distance,
+            distance,
+            radiance: glow.emitted / (squared * glow.per_volume),
+            pdf: glow.per_volume * squared / glow.sigma_t,
+        })
+    }
+
+    /// Starts a light path from a glowing point to any side; `None` where the point drawn does not glow.
+    ///
+    /// `u[0]` and `u[1]` decide the direction, `u[2]` the cell, `u[3]` and the stream the place in it. The flux has its
+    /// colour: its mean, lost paths counted as 0, is the power of the matter, in W.
+    #[must_use]
+    pub fn emit(&self, medium: &Medium, u: [f32; 4], stream: &mut Stream) -> Option<Emitted> {
+        let glow = self.glow(medium, u[2], Vec3::new(u[3], stream.uniform(), stream.uniform()))?;
+        let origin = medium.volume().grid().index_to_world(glow.place);
+        let ray = Ray::new(origin, warp::sphere([u[0], u[1]]));
+        Some(Emitted { ray, flux: glow.emitted * (4.0 * PI / glow.per_volume) })
+    }
+
+    /// The place `u` in a cell chosen by power, if it glows.
+    fn glow(&self, medium: &Medium, choice: f32, u: Vec3) -> Option<Glow> {
+        let (i, chance, _) = self.cells.sample(choice);
+        let b = &self.bounds[i];
         let place = b.min + b.size() * u;
         if !medium.contains(place) {
             return None;
         }
         let optics = medium.optics(place);
-        let to_light = medium.volume().grid().index_to_world(place) - from;
-        let squared = to_light.length_squared();
         let sigma_t = medium.density() * optics.opacity;
         let emitted = optics.emitted() * sigma_t;
-        if squared == 0.0 || emitted.is_black() {
-            return None;
-        }
         let per_volume = chance / (b.size().element_product() * self.voxel_volume);
-        let distance = squared.sqrt();
-        Some(LightSample {
-            direction: to_light / distance,
-            distance,
-            radiance: emitted / (squared * per_volume),
-            pdf: per_volume * squared / sigma_t,
-        })
+        (!emitted.is_black()).then_some(Glow { place, sigma_t, emitted, per_volume })
     }
 
     /// The density of [`Self::sample`] for a collision found by a free flight: at an index-space place

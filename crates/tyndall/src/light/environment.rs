@@ -1,6 +1,6 @@
 //! Light from all around: constant, or a map of latitude and longitude.
 
-use super::{BRIGHTEST, LightSample, Passed};
+use super::{BRIGHTEST, Emitted, Enclosure, LightSample, Passed};
 use crate::math::{Frame, Ray, Rgb, Vec3, cast};
 use crate::sampling::{Discrete, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
@@ -74,12 +74,16 @@ impl Environment {
         }
     }
 
+    fn toward(&self, u: [f32; 2]) -> Option<Vec3> {
+        match &self.sky {
+            Sky::Constant(_) => Some(warp::sphere(u)),
+            Sky::Map { map, frame } => Some(frame.to_world(map.sample(u)?)),
+        }
+    }
+
     #[inline]
     pub(super) fn sample(&self, u: [f32; 2]) -> Option<LightSample> {
-        let direction = match &self.sky {
-            Sky::Constant(_) => warp::sphere(u),
-            Sky::Map { map, frame } => frame.to_world(map.sample(u)?),
-        };
+        let direction = self.toward(u)?;
         let pdf = self.pdf(direction);
         let radiance = self.radiance(direction) / pdf;
         (pdf > 0.0).then_some(LightSample { direction, distance: f32::INFINITY, radiance, pdf })
@@ -89,6 +93,33 @@ impl Environment {
     pub(super) fn passed(&self, ray: &Ray) -> Passed {
         let (radiance, pdf) = (self.radiance(ray.direction), self.pdf(ray.direction));
         Passed { distance: f32::INFINITY, radiance, pdf }
+    }
+
+    /// Evenly over the silhouette that the box has in a direction drawn as by [`Self::sample`].
+    pub(super) fn emit(&self, into: &Enclosure, u: [f32; 4]) -> Option<Emitted> {
+        let direction = self.toward([u[2], u[3]])?;
+        let (ray, area) = into.cross(-direction.as_dvec3(), [u[0], u[1]])?;
+        let measure = cast::single(area) / self.pdf(direction);
+        let flux = match &self.sky {
+            Sky::Constant(_) => Rgb::splat(measure),
+            Sky::Map { .. } => self.radiance(direction) * measure,
+        };
+        Some(Emitted { ray, flux })
+    }
+
+    /// White for a map.
+    pub(super) fn color(&self) -> Rgb {
+        match &self.sky {
+            Sky::Constant(radiance) => *radiance,
+            Sky::Map { .. } => Rgb::WHITE,
+        }
+    }
+
+    pub(super) fn same_paths(&self, other: &Self) -> bool {
+        match (&self.sky, &other.sky) {
+            (Sky::Constant(_), Sky::Constant(_)) => true,
+            (a, b) => a == b,
+        }
     }
 
     pub(super) fn strength(&self) -> f64 {

@@ -4,13 +4,18 @@
 mod area;
 mod directional;
 mod emission;
+mod emit;
+mod enclosure;
 mod environment;
 mod point;
 mod set;
+mod triangle;
 
 pub use area::{Disk, Rect, SphereLight};
 pub use directional::Directional;
 pub use emission::Emission;
+pub use emit::Emitted;
+pub use enclosure::Enclosure;
 pub use environment::{Environment, Map, MapError};
 pub use point::PointLight;
 pub use set::LightSet;

@@ -1,7 +1,9 @@
 //! A point source.
 
-use super::{LightSample, Target};
-use crate::math::{Rgb, Vec3};
+use super::{Emitted, Enclosure, LightSample, Target};
+use crate::math::{Ray, Rgb, Vec3};
+use crate::sampling::warp;
+use std::f64::consts::PI;
 
 /// Shines equally to all sides from one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +25,16 @@ impl PointLight {
         let distance = squared.sqrt();
         let radiance = self.intensity / squared;
         Some(LightSample { direction: to_light / distance, distance, radiance, pdf: f32::INFINITY })
+    }
+
+    /// From outside into the solid angle of the box, from inside to all sides.
+    pub(super) fn emit(&self, into: &Enclosure, u: [f32; 4]) -> Option<Emitted> {
+        let toward = [u[0], u[1]];
+        if into.contains(self.position) {
+            return Some(Emitted::evenly(Ray::new(self.position, warp::sphere(toward)), 4.0 * PI));
+        }
+        let (ray, solid_angle) = into.aim(self.position, toward)?;
+        Some(Emitted::evenly(ray, solid_angle))
     }
 
     pub(super) fn strength(&self, target: &Target) -> f64 {

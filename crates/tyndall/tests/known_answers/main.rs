@@ -10,6 +10,7 @@
 
 mod coverage;
 mod emission;
+mod emit;
 mod furnace;
 mod levels;
 mod lights;

@@ -1,0 +1,457 @@
+//! Light paths from every kind of light: their power into the box, and the fluence that they make inside it.
+
+use crate::scenes::{Setup, mean};
+use std::f64::consts::PI;
+use std::sync::Arc;
+use tyndall::light::{
+    Directional, Disk, Emission, Enclosure, Environment, Light, LightSample, Map, PointLight, Rect,
+    SphereLight,
+};
+use tyndall::math::{Bounds, Ray, Rgb, Vec3};
+use tyndall::sampling::{Stream, warp};
+use tyndall::transfer::{Optics, Point};
+use tyndall::volume::{Grid, Interpolation, Space, ValueMap, Volume, Voxels};
+use tyndall_testing::{ChiSquare, Mean, ZTest};
+
+const UNIT: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// Unequal edges along the axes; turned; sheared and left-handed. All have the same middle.
+fn grids() -> [(&'static str, Grid); 3] {
+    let (s, c) = 0.6_f64.sin_cos();
+    let (p, q) = 0.9_f64.sin_cos();
+    let turned = [[c, -s * q, s * p], [s, c * q, -c * p], [0.0, p, q]];
+    let sheared = [[1.0, 0.28, -0.3], [0.0, 0.96, 0.2], [0.0, 0.0, -0.87_f64.sqrt()]];
+    [("straight", UNIT), ("turned", turned), ("sheared", sheared)].map(|(name, direction)| {
+        let (dims, spacing) = ([10, 12, 8], [0.2, 0.15, 0.3]);
+        let from_middle = |row: [f64; 3]| -> f64 {
+            (0..3).map(|a| row[a] * 0.5 * (dims[a] as f64 - 1.0) * spacing[a]).sum()
+        };
+        let origin = direction.map(|row| 0.1 - from_middle(row));
+        (name, Grid::new(dims, spacing, direction, origin, Space::Plain).unwrap())
+    })
+}
+
+/// Middle of the grids.
+const MIDDLE: Vec3 = Vec3::splat(0.1);
+
+/// A sphere inside the box of every grid.
+const PROBE: (Vec3, f32) = (Vec3::new(0.3, 0.2, -0.1), 0.35);
+
+/// Area vectors of the three pairs of faces.
+fn normals(grid: &Grid) -> [Vec3; 3] {
+    let c = grid.world_corners();
+    let [x, y, z] = [c[1] - c[0], c[2] - c[0], c[4] - c[0]];
+    [y.cross(z), z.cross(x), x.cross(y)]
+}
+
+fn silhouette(grid: &Grid, direction: Vec3) -> f64 {
+    normals(grid).iter().map(|n| f64::from(n.dot(direction).abs())).sum()
+}
+
+fn hits(grid: &Grid, ray: &Ray) -> bool {
+    // Rounding may lead a ray past an edge.
+    let b = grid.index_bounds();
+    let loose = Bounds::new(b.min - 1e-4, b.max + 1e-4);
+    !loose.intersect(&grid.ray_to_index(ray)).is_empty()
+}
+
+fn uniforms(stream: &mut Stream) -> [f32; 4] {
+    std::array::from_fn(|_| stream.uniform())
+}
+
+/// Power per unit of the light's colour, green.
+fn power(light: &Light, grid: &Grid, paths: u32) -> Mean {
+    let box_ = Enclosure::new(grid);
+    mean(3, paths, |_, stream| light.emit(&box_, uniforms(stream)).map_or(0.0, |e| f64::from(e.flux.g)))
+}
+
+fn point(position: Vec3) -> Light {
+    Light::Point(PointLight { position, intensity: Rgb::WHITE })
+}
+
+fn near(found: f64, expected: f64, tolerance: f64) {
+    assert!((found / expected - 1.0).abs() < tolerance, "{found}, expected {expected}");
+}
+
+#[test]
+fn parallel_light_falls_on_the_silhouette() {
+    for (_, grid) in grids() {
+        for travel in [Vec3::X, Vec3::new(0.3, -1.0, 0.2), Vec3::new(-2.0, 0.1, 1.0)] {
+            let sharp = Light::Directional(Directional::new(travel, Rgb::WHITE, 0.0));
+            near(power(&sharp, &grid, 100).mean(), silhouette(&grid, travel.normalize()), 1e-6);
+        }
+    }
+}
+
+/// Cauchy: the mean silhouette of a convex body is a quarter of its surface.
+#[test]
+fn a_constant_sky_falls_on_the_surface() {
+    for (_, grid) in grids() {
+        let sky = Light::Environment(Environment::constant(Rgb::WHITE, true));
+        let surface: f64 = normals(&grid).iter().map(|n| 2.0 * f64::from(n.length())).sum();
+        power(&sky, &grid, 1_000_000).against(PI * surface).assert_within(3.5, 1e-3);
+    }
+}
+
+#[test]
+fn points_fill_the_solid_angle_of_the_box() {
+    let [(_, straight), ..] = grids();
+    for (_, grid) in grids() {
+        let inside = [MIDDLE, grid.index_to_world(Vec3::splat(0.1))];
+        for at in inside {
+            near(power(&point(at), &grid, 100).mean(), 4.0 * PI, 1e-6);
+        }
+        // From far the box is its silhouette, on both sides of where its rays become parallel.
+        for distance in [1e4, 1e6, 1.99e7, 2.3e7, 1e12] {
+            let way = Vec3::new(0.5, 0.7, -0.3).normalize();
+            let expected = silhouette(&grid, way) / f64::from(distance).powi(2);
+            near(
+                power(&point(MIDDLE + way * distance), &grid, 100).mean(),
+                expected,
+                5.0 / f64::from(distance) + 3e-6,
+            );
+        }
+    }
+    // Above the middle of one face; [vanOosterom83] for four rectangles of a corner each.
+    let size = straight.world_bounds().size().as_dvec3();
+    for height in [1e-6, 1e-2, 1.0, 30.0] {
+        let at = MIDDLE + Vec3::Z * (0.5 * size.z + height) as f32;
+        let height = f64::from(at.z - MIDDLE.z) - 0.5 * size.z;
+        let (a, b) = (0.5 * size.x, 0.5 * size.y);
+        let expected = 4.0 * (a * b).atan2(height * (a * a + b * b + height * height).sqrt());
+        near(power(&point(at), &straight, 100).mean(), expected, 1e-6);
+    }
+}
+
+#[test]
+fn surfaces_inside_shine_whole() {
+    let [(_, grid), ..] = grids();
+    let up = Vec3::new(0.2, 0.3, 1.0);
+    let rect = Light::Rect(Rect::new(MIDDLE, up, Vec3::X, [0.5, 0.3], Rgb::WHITE));
+    near(power(&rect, &grid, 100).mean(), PI * 0.15, 1e-6);
+    let disk = Light::Disk(Disk::new(MIDDLE, up, 0.3, Rgb::WHITE));
+    near(power(&disk, &grid, 100).mean(), PI * PI * 0.09, 1e-6);
+    let sphere = Light::Sphere(SphereLight { middle: MIDDLE, radius: 0.3, radiance: Rgb::WHITE });
+    near(power(&sphere, &grid, 100).mean(), PI * 4.0 * PI * 0.09, 1e-6);
+    let around = Light::Sphere(SphereLight { middle: MIDDLE, radius: 3.0, radiance: Rgb::WHITE });
+    assert_eq!(power(&around, &grid, 100).mean(), 0.0);
+}
+
+/// Beside a face, an edge and a corner, close to and far: the density is one over the flux, which is constant.
+#[test]
+fn directions_from_outside_are_uniform_over_the_box() {
+    let places = [[0.5, 0.4, 1.05], [-0.3, 0.2, 1.4], [1.3, -0.2, -0.6], [0.3, 1.6, 3.0]];
+    for (name, grid) in grids() {
+        let box_ = Enclosure::new(&grid);
+        let b = grid.index_bounds();
+        for place in places {
+            let from = grid.index_to_world(b.min + b.size() * Vec3::from_array(place));
+            let light = point(from);
+            let flux = light.emit(&box_, [0.5; 4]).unwrap().flux.g;
+            let sample = |u: [f32; 2]| {
+                let emitted = light.emit(&box_, [u[0], u[1], 0.5, 0.5])?;
+                assert_eq!(emitted.flux.g, flux);
+                Some(emitted.ray.direction.to_array())
+            };
+            let pdf = |w: [f32; 3]| {
+                let ray = Ray::new(from, Vec3::from_array(w));
+                if hits(&grid, &ray) { 1.0 / f64::from(flux) } else { 0.0 }
+            };
+            let test = ChiSquare { rows: 32, columns: 64, ..ChiSquare::of(3 * places.len()) };
+            let fit = test.directions(sample, pdf);
+            assert!(fit.passes(), "{name}, from {place:?}: {fit}");
+        }
+    }
+}
+
+/// On faces, edges and corners, in their planes and lines, a hair away from them, and far off: paths start at finite
+/// places with finite flux, and those from outside meet the box.
+#[test]
+fn no_place_of_a_light_is_too_hard() {
+    let mut started = 0;
+    for (name, grid) in grids() {
+        let box_ = Enclosure::new(&grid);
+        let b = grid.index_bounds();
+        let along = [-1e30, -1e7, -3.0, -1e-6, 0.0, 1e-6, 0.5, 1.0, 1.000_001, 2.0, 1e4, 1e12];
+        for place in (0..12_usize.pow(3)).map(|i| [along[i % 12], along[i / 12 % 12], along[i / 144]]) {
+            let place = Vec3::from_array(place);
+            let from = grid.index_to_world(b.min + b.size() * place);
+            let back = (0.4 - place).clamp(Vec3::splat(-1e9), Vec3::splat(1e9));
+            let sphere = SphereLight { middle: from, radius: 0.1, radiance: Rgb::WHITE };
+            let rect = Rect::new(from, back, Vec3::X, [0.1, 0.2], Rgb::WHITE);
+            for (kind, light) in [point(from), Light::Rect(rect), Light::Sphere(sphere)].iter().enumerate() {
+                for u in [[0.0; 4], [0.3, 0.6, 0.5, 0.5], [1.0_f32.next_down(); 4]] {
+                    let Some(emitted) = light.emit(&box_, u) else { continue };
+                    let what = format!("{name}, {place}, {kind}: {emitted:?}");
+                    assert!(emitted.ray.origin.is_finite() && emitted.flux.is_finite(), "{what}");
+                    assert!((emitted.ray.direction.length() - 1.0).abs() < 1e-5, "{what}");
+                    let outside =
+                        place.cmplt(Vec3::splat(-1e-5)).any() || place.cmpgt(Vec3::splat(1.000_01)).any();
+                    assert!(kind != 0 || !outside || hits(&grid, &emitted.ray), "{what}");
+                    started += 1;
+                }
+            }
+        }
+    }
+    assert!(started > 6000, "{started}");
+}
+
+/// Just off a face's middle its diagonals cross, where both its triangles are almost flat; a light there sees half the
+/// sphere full of box, or counts as being on the border.
+#[test]
+fn a_hair_above_a_face_is_on_it() {
+    let grid = Grid::new([4; 3], [0.25; 3], UNIT, [-0.375, -0.375, 0.125], Space::Plain).unwrap();
+    for exponent in 4..40 {
+        let at = point(Vec3::Z * -(10.0_f32.powi(-exponent)));
+        let flux = power(&at, &grid, 100).mean() / PI;
+        assert!((flux - 2.0).abs() < 1e-3 || (flux - 4.0).abs() < 1e-6, "1e-{exponent}: {flux} pi");
+    }
+}
+
+/// A box so flat that the corners of its faces fall together in double precision.
+#[test]
+fn no_box_is_too_flat() {
+    let grid = Grid::new([1; 3], [1e-15, 1e15, 1.0], UNIT, [0.0; 3], Space::Plain).unwrap();
+    let box_ = Enclosure::new(&grid);
+    let along = [-1e16, -1.0, -1e-6, 0.0, 1e-10, 1.0, 1e13];
+    for place in (0..7_usize.pow(3)).map(|i| [along[i % 7], along[i / 7 % 7], along[i / 49]]) {
+        for u in [[0.0; 4], [0.3, 0.6, 0.5, 0.5], [1.0_f32.next_down(); 4]] {
+            let Some(emitted) = point(Vec3::from_array(place)).emit(&box_, u) else { continue };
+            let finite = emitted.ray.origin.is_finite() && emitted.ray.direction.is_finite();
+            assert!(finite && emitted.flux.is_finite(), "{place:?}: {emitted:?}");
+        }
+    }
+}
+
+/// A silhouette of 1e44 square units under light of 1 has more power than single precision holds.
+#[test]
+fn power_past_single_precision_is_not_sent() {
+    let grid = Grid::new([1 << 24, 1 << 24, 1], [1e15; 3], UNIT, [0.0; 3], Space::Plain).unwrap();
+    let sun = |travel| Light::Directional(Directional::new(travel, Rgb::WHITE, 0.0));
+    assert!(sun(Vec3::Z).emit(&Enclosure::new(&grid), [0.5; 4]).is_none());
+    assert!(sun(Vec3::X).emit(&Enclosure::new(&grid), [0.5; 4]).is_some());
+}
+
+/// Rays start before the box, so that its first face is not behind them.
+#[test]
+fn rays_enter_the_box_ahead() {
+    for (name, grid) in grids() {
+        let box_ = Enclosure::new(&grid);
+        for (kind, light) in lights().iter().filter(|(kind, _)| !kind.ends_with("inside")) {
+            let mut stream = Stream::new(1, [0; 3]);
+            for _ in 0..10_000 {
+                let Some(emitted) = light.emit(&box_, uniforms(&mut stream)) else { continue };
+                let stretch = grid.index_bounds().intersect(&grid.ray_to_index(&emitted.ray));
+                assert!(stretch.start > 0.0, "{name}, {kind}: {emitted:?}");
+            }
+        }
+    }
+}
+
+fn lights() -> Vec<(&'static str, Light)> {
+    let color = Rgb::new(0.7, 2.0, 0.3);
+    let texels = |i: usize| {
+        Rgb::new(0.1, if i.is_multiple_of(37) { 9.0 } else { 0.2 }, (i % 5) as f32 * 0.1 + (i / 256) as f32)
+    };
+    let map = Arc::new(Map::new(32, 16, (0..32 * 16).map(texels).collect()).unwrap());
+    let travel = Vec3::new(0.3, -1.0, 0.2);
+    let (close, wide, inner) =
+        (Vec3::new(0.4, 2.3, -0.5), Vec3::new(-3.0, 2.5, 4.0), Vec3::new(-0.3, 0.1, 0.5));
+    let sphere = |middle, radius| Light::Sphere(SphereLight { middle, radius, radiance: color });
+    let rect = |at: Vec3, size| Light::Rect(Rect::new(at, PROBE.0 - at, Vec3::X, size, color));
+    let disk = |at: Vec3, radius| Light::Disk(Disk::new(at, PROBE.0 - at + Vec3::X * 0.3, radius, color));
+    let point = |position| Light::Point(PointLight { position, intensity: color });
+    vec![
+        ("sharp sun", Light::Directional(Directional::new(travel, color, 0.0))),
+        ("sun", Light::Directional(Directional::new(travel, color, 10.0))),
+        ("half the sky", Light::Directional(Directional::new(travel, color, 180.0))),
+        ("point close", point(close)),
+        ("point aside", point(wide)),
+        ("point inside", point(inner)),
+        ("rect close", rect(close, [1.0, 0.5])),
+        ("rect aside", rect(wide, [2.0, 2.5])),
+        ("rect inside", rect(inner, [0.2, 0.1])),
+        ("rect half inside", rect(Vec3::new(0.3, 0.9, -0.3), [0.3, 1.5])),
+        ("disk close", disk(close, 0.7)),
+        ("disk aside", disk(wide, 1.5)),
+        ("disk inside", disk(inner, 0.1)),
+        ("sphere close", sphere(close, 0.6)),
+        ("sphere aside", sphere(wide, 2.0)),
+        ("sphere inside", sphere(inner, 0.1)),
+        ("sphere half inside", sphere(Vec3::new(0.4, 0.9, -0.4), 0.2)),
+        ("sky", Light::Environment(Environment::constant(color, true))),
+        ("map", Light::Environment(Environment::map(map, Vec3::Z, 30.0, true))),
+    ]
+}
+
+/// What a path of flux 1 adds to the mean fluence: its length inside the probe over the probe's volume.
+fn crossing(ray: &Ray) -> f64 {
+    let (center, radius) = PROBE;
+    let to_center = center - ray.origin;
+    let along = to_center.dot(ray.direction);
+    let aside = (to_center - ray.direction * along).length_squared();
+    let half_chord = (radius * radius - aside).max(0.0).sqrt();
+    let volume = 4.0 / 3.0 * PI * f64::from(radius).powi(3);
+    if along > 0.0 { response(ray.direction) * 2.0 * f64::from(half_chord) / volume } else { 0.0 }
+}
+
+/// How well the probe sees light that travels in a direction: better from some sides, so that a path turned round shows.
+fn response(travel: Vec3) -> f64 {
+    1.0 + f64::from(travel.dot(Vec3::new(0.6, -0.48, 0.64)))
+}
+
+fn place_in_the_probe(stream: &mut Stream) -> Vec3 {
+    let (center, radius) = PROBE;
+    let direction = warp::sphere([stream.uniform(), stream.uniform()]);
+    center + direction * (radius * stream.uniform().cbrt())
+}
+
+/// Mean fluence by light paths and by light samples: equal, both known to a percent.
+fn compare(name: &str, by_paths: Mean, by_samples: Mean) {
+    let variance = by_paths.variance_of_mean() + by_samples.variance_of_mean();
+    let test = ZTest::new(by_paths.mean(), variance, by_samples.mean());
+    assert!(test.is_within(4.0, 1e-2), "{name}: {test}");
+}
+
+/// Path by path the mean fluence over a small sphere is that which [`Light::sample`] finds at its points.
+#[test]
+fn paths_bring_the_fluence_that_samples_see() {
+    const PATHS: u32 = 1 << 20;
+    for (grid_name, grid) in grids() {
+        let box_ = Enclosure::new(&grid);
+        for (name, light) in lights() {
+            // Only a map has colours of its own.
+            for channel in if name == "map" { 0..3 } else { 1..2 } {
+                let of = |rgb: Rgb| f64::from(rgb.to_array()[channel]);
+                let by_paths = mean(7, PATHS, |_, stream| {
+                    let emitted = light.emit(&box_, uniforms(stream));
+                    emitted.map_or(0.0, |e| of(e.flux * light.color()) * crossing(&e.ray))
+                });
+                let seen = |s: LightSample| of(s.radiance) * response(-s.direction);
+                let by_samples = mean(8, PATHS, |_, stream| {
+                    let from = place_in_the_probe(stream);
+                    light.sample(from, [stream.uniform(), stream.uniform()]).map_or(0.0, seen)
+                });
+                compare(&format!("{grid_name}, {name}, channel {channel}"), by_paths, by_samples);
+            }
+        }
+    }
+}
+
+/// Glowing matter in the lower layers, vacuum above, where the probe is.
+fn glowing(grid: Grid, layers: usize) -> Setup {
+    let [nx, ny, _] = grid.dims();
+    let data = (0..grid.len()).map(|i| if i / (nx * ny) < layers { 1.0 } else { 0.0 }).collect();
+    let volume = Volume::new(grid, Voxels::F32(data), ValueMap::IDENTITY).unwrap();
+    let look = |optics: Optics, at: f32| [-0.4, 0.4].map(|d| Point { value: at + d, optics });
+    let albedo = Rgb::splat(0.3);
+    let glow = Optics { emission: Rgb::new(0.5, 3.0, 1.0), opacity: 0.4, albedo, ..Optics::default() };
+    let nothing = Optics { opacity: 0.0, ..Optics::default() };
+    let points = [look(nothing, 0.0), look(glow, 1.0)].concat();
+    Setup::new(volume.with_interpolation(Interpolation::Nearest), points, 2.0)
+}
+
+#[test]
+fn glowing_matter_sends_all_its_power() {
+    for (_, grid) in grids() {
+        for layers in [8, 2] {
+            let volume = f64::from(grid.voxel_size()).powi(3) * grid.len() as f64 * layers as f64 / 8.0;
+            let scene = glowing(grid.clone(), layers).scene();
+            let medium = &*scene.medium;
+            let emission = Emission::new(medium).unwrap();
+            let emitted = mean(5, 1 << 20, |_, stream| {
+                let u = uniforms(stream);
+                emission.emit(medium, u, stream).map_or(0.0, |e| f64::from(e.flux.g))
+            });
+            // To all sides: extinction 2 x 0.4, of which albedo leaves 0.7, and source radiance 3.
+            let expected = 4.0 * PI * 2.0 * 0.4 * 0.7 * 3.0 * volume;
+            emitted.against(expected).assert_within(3.5, 2e-3);
+        }
+    }
+}
+
+#[test]
+fn glowing_matter_brings_the_fluence_that_samples_see() {
+    for (name, grid) in grids() {
+        let scene = glowing(grid, 2).scene();
+        let medium = &*scene.medium;
+        let emission = Emission::new(medium).unwrap();
+        for channel in [0, 1] {
+            let of = |rgb: Rgb| f64::from(rgb.to_array()[channel]);
+            let by_paths = mean(7, 1 << 21, |_, stream| {
+                let u = uniforms(stream);
+                emission.emit(medium, u, stream).map_or(0.0, |e| of(e.flux) * crossing(&e.ray))
+            });
+            let by_samples = mean(8, 1 << 20, |_, stream| {
+                let from = place_in_the_probe(stream);
+                let sample = emission.sample(medium, from, stream);
+                sample.map_or(0.0, |s| of(s.radiance) * response(-s.direction))
+            });
+            compare(&format!("{name}, channel {channel}"), by_paths, by_samples);
+        }
+    }
+}
+
+/// The same kinds of lights in another colour, and each otherwise changed.
+#[test]
+fn a_colour_changes_no_path_and_anything_else_does() {
+    let at = Vec3::new(0.4, 2.3, -0.5);
+    let (x, y) = (Vec3::X, Vec3::Y);
+    let texels = |bright: f32| Arc::new(Map::new(2, 1, vec![Rgb::splat(bright), Rgb::WHITE]).unwrap());
+    let map = texels(2.0);
+    let sun = |travel, color, angle| Light::Directional(Directional::new(travel, color, angle));
+    let point = |position, intensity| Light::Point(PointLight { position, intensity });
+    let rect = |at, to, up, size, color| Light::Rect(Rect::new(at, to, up, size, color));
+    let disk = |at, to, radius, color| Light::Disk(Disk::new(at, to, radius, color));
+    let sphere = |middle, radius, radiance| Light::Sphere(SphereLight { middle, radius, radiance });
+    let sky = |color| Light::Environment(Environment::constant(color, true));
+    let maps =
+        |map: &Arc<Map>, up, turn| Light::Environment(Environment::map(Arc::clone(map), up, turn, true));
+    let (red, white) = (Rgb::new(3.0, 0.0, 0.1), Rgb::WHITE);
+    // Per kind a light, the same in another colour, and others.
+    let kinds = [
+        [sun(-y, red, 5.0), sun(-y, white, 5.0), sun(-y, red, 5.1), sun(x - y, red, 5.0)].to_vec(),
+        [point(at, red), point(at, white), point(at + x, red)].to_vec(),
+        vec![
+            rect(at, -y, x, [1.0, 2.0], red),
+            rect(at, -y, x, [1.0, 2.0], white),
+            rect(at + x, -y, x, [1.0, 2.0], red),
+            rect(at, -y - x, x, [1.0, 2.0], red),
+            rect(at, -y, Vec3::Z, [1.0, 2.0], red),
+            rect(at, -y, x, [1.1, 2.0], red),
+            rect(at, -y, x, [1.0, 2.1], red),
+        ],
+        vec![
+            disk(at, -y, 1.0, red),
+            disk(at, -y, 1.0, white),
+            disk(at + x, -y, 1.0, red),
+            disk(at, -y - x, 1.0, red),
+            disk(at, -y, 1.1, red),
+        ],
+        [sphere(at, 1.0, red), sphere(at, 1.0, white), sphere(at + x, 1.0, red), sphere(at, 1.1, red)]
+            .to_vec(),
+        [sky(red), sky(white)].to_vec(),
+        [maps(&map, y, 0.0), maps(&texels(2.0), y, 0.0), maps(&map, y, 1.0), maps(&texels(3.0), y, 0.0)]
+            .to_vec(),
+    ];
+    let [(_, grid), ..] = grids();
+    let box_ = Enclosure::new(&grid);
+    for (i, lights) in kinds.iter().enumerate() {
+        let (light, recoloured) = (&lights[0], &lights[1]);
+        assert!(light.same_paths(recoloured), "{light:?}");
+        let mut stream = Stream::new(1, [0; 3]);
+        for _ in 0..100 {
+            let u = uniforms(&mut stream);
+            assert_eq!(light.emit(&box_, u), recoloured.emit(&box_, u), "{light:?}");
+        }
+        let strangers = kinds.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, lights)| &lights[0]);
+        for other in lights[2..].iter().chain(strangers) {
+            assert!(!light.same_paths(other) && !other.same_paths(light), "{light:?} and {other:?}");
+        }
+        let is_map = i == 6;
+        let expected = if is_map { [white, white] } else { [red, white] };
+        assert_eq!([light.color(), recoloured.color()], expected);
+    }
+    let hidden = Light::Environment(Environment::constant(red, false));
+    assert!(sky(red).same_paths(&hidden), "what the camera sees is no path");
+}
