@@ -222,6 +222,8 @@ pub enum Integrator {
     Raymarch,
     /// Unbiased Monte Carlo of all orders of scattering: the ground truth
     Path,
+    /// Photon mapping that survives edits: redoes the light alone that an edit touched
+    Photon,
 }
 
 impl Integrator {
@@ -230,6 +232,7 @@ impl Integrator {
         match self {
             Self::Raymarch => "raymarch",
             Self::Path => "path",
+            Self::Photon => "photon",
         }
     }
 }

@@ -1,13 +1,13 @@
 //! A session: a scene, its integrator and the film, refined slice by slice.
 
 use crate::film::{Film, Image};
-use crate::integrator::{Integrator, Pending, Stop};
+use crate::integrator::{Integrator, Stop, TileState};
 use crate::scene::{Difference, IntegratorKind, Scene};
 use crate::simd::Level;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// When a slice of work ends; the first limit met counts.
 #[derive(Clone, Debug)]
@@ -42,12 +42,14 @@ pub struct Session {
     scene: Scene,
     integrator: Integrator,
     film: Film,
-    /// What a stop left half done, per tile.
-    pending: Vec<Pending>,
+    /// What the method keeps of each tile beside its pixels.
+    tiles: Vec<TileState>,
     threads: Arc<rayon::ThreadPool>,
     level: Level,
     /// Samples per pixel, on average, that the last edit left valid.
     kept: f64,
+    /// Time spent since the last edit on what a sample needs beforehand, and on samples.
+    spent: [Duration; 2],
 }
 
 impl Session {
@@ -62,8 +64,8 @@ impl Session {
     pub fn with_level(scene: Scene, threads: Arc<rayon::ThreadPool>, level: Level) -> Self {
         let integrator = threads.install(|| Integrator::new(&scene, level));
         let mut film = Film::new(scene.size);
-        let pending = vec![Pending::default(); film.tiles_mut().len()];
-        Self { integrator, film, pending, scene, threads, level, kept: 0.0 }
+        let tiles = vec![TileState::default(); film.tiles_mut().len()];
+        Self { integrator, film, tiles, scene, threads, level, kept: 0.0, spent: [Duration::ZERO; 2] }
     }
 
     /// Goes on with an edited scene; gives what the edit changed. This is the only place where light is discarded, and the
@@ -71,19 +73,45 @@ impl Session {
     pub fn set_scene(&mut self, scene: Scene) -> Difference {
         let difference = Difference::between(&self.scene, &scene);
         if self.integrator.is_touched_by(&difference) {
-            *self = Self::with_level(scene, self.threads.clone(), self.level);
+            self.film = Film::new(scene.size);
+            self.tiles.resize_with(self.film.tiles_mut().len(), TileState::default);
+            let Self { integrator, tiles, scene: old, threads, level, .. } = self;
+            threads.install(|| integrator.update(old, &scene, &difference, tiles, *level));
         } else {
-            self.scene = scene;
-            self.kept = self.film.mean_samples();
+            self.integrator.count_anew(&mut self.tiles);
         }
+        self.scene = scene;
+        self.kept = self.film.mean_samples();
+        self.spent = [Duration::ZERO; 2];
         difference
     }
 
     /// Of what the session is made of, the share that was really computed since the last edit, or since the beginning:
-    /// of the `pixels` those that took samples.
+    /// of the `pixels` those that took samples; of light paths (`photons`) and view-ray `segments` those computed.
     #[must_use]
-    pub fn recomputed(&self) -> [(&'static str, f64); 1] {
-        [("pixels", (self.film.mean_samples() - self.kept).min(1.0))]
+    pub fn recomputed(&self) -> Vec<(&'static str, f64)> {
+        let share = |[all, computed]: [usize; 2]| computed as f64 / all.max(1) as f64;
+        match &self.integrator {
+            Integrator::RayMarch(_) | Integrator::Path(_) => {
+                vec![("pixels", (self.film.mean_samples() - self.kept).min(1.0))]
+            }
+            Integrator::Photon(photon) => {
+                let segments = self.tiles.iter().map(TileState::segments);
+                let segments = segments.fold([0; 2], |[a, b], [c, d]| [a + c, b + d]);
+                vec![("photons", share(photon.paths())), ("segments", share(segments))]
+            }
+        }
+    }
+
+    /// Seconds spent since the last edit, or since the beginning: of a photon mapper on `photons` and on `segments` and later
+    /// passes, of others on `pixels`.
+    #[must_use]
+    pub fn spent(&self) -> Vec<(&'static str, f64)> {
+        let [before, samples] = self.spent.map(|time| time.as_secs_f64());
+        match &self.integrator {
+            Integrator::RayMarch(_) | Integrator::Path(_) => vec![("pixels", samples)],
+            Integrator::Photon(_) => vec![("photons", before), ("segments", samples)],
+        }
     }
 
     /// Threads that work.
@@ -115,20 +143,30 @@ impl Session {
     /// no trace in the bits.
     pub fn refine(&mut self, budget: &Budget) -> Progress {
         let stop = || Stop::when(&budget.cancel, budget.deadline);
-        let (scene, integrator) = (&self.scene, &self.integrator);
-        while self.film.samples() < budget.samples && !stop().reached() {
+        let Self { scene, integrator, film, tiles, threads, spent, .. } = self;
+        while film.samples() < budget.samples && !stop().reached() {
+            let so_far = film.samples();
+            let begun = Instant::now();
+            let prepared = threads.install(|| integrator.prepare(scene, so_far, &stop));
+            spent[0] += begun.elapsed();
+            if !prepared {
+                break;
+            }
             // Several passes at once, as soon as that delays no picture much, spare threads the waiting for each other.
-            let so_far = self.film.samples();
-            let pass = so_far.saturating_add((so_far / 4).clamp(1, 16)).min(budget.samples);
-            let tiles = self.film.tiles_mut().par_iter_mut().zip(&mut self.pending).with_max_len(1);
-            self.threads.install(|| {
-                tiles.for_each(|(tile, pending)| {
+            let passes = (so_far / 4).clamp(1, 16).min(integrator.samples_at_once());
+            let pass = so_far.saturating_add(passes).min(budget.samples);
+            let integrator = &*integrator;
+            let begun = Instant::now();
+            let work = film.tiles_mut().par_iter_mut().zip(&mut *tiles).with_max_len(1);
+            threads.install(|| {
+                work.for_each(|(tile, state)| {
                     let stop = stop();
                     if !stop.reached() {
-                        integrator.refine(scene, tile, pending, pass, &stop);
+                        integrator.refine(scene, tile, state, pass, &stop);
                     }
                 });
             });
+            spent[1] += begun.elapsed();
         }
         self.progress()
     }
@@ -145,7 +183,7 @@ impl Session {
     pub fn relative_error(&self) -> Option<f64> {
         match self.scene.render.integrator {
             IntegratorKind::RayMarch { .. } => None,
-            IntegratorKind::Path => self.film.relative_error(),
+            IntegratorKind::Path | IntegratorKind::Photon(_) => self.film.relative_error(),
         }
     }
 }

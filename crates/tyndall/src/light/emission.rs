@@ -64,6 +64,12 @@ impl Emission {
         Some(Self { places, cells, numbers, bounds, voxel_volume })
     }
 
+    /// Whether points are drawn as from the other: each cell with the same chance.
+    #[must_use]
+    pub fn same_places(&self, other: &Self) -> bool {
+        self.numbers == other.numbers && self.cells == other.cells && self.bounds == other.bounds
+    }
+
     /// As [`super::Light::strength`]: the power, as if it all came from the target's middle to its border.
     #[must_use]
     pub fn strength(&self, target: &Target) -> f64 {

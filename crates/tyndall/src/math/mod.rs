@@ -3,11 +3,13 @@
 pub mod bounds;
 pub mod cast;
 pub mod color;
+pub mod direction;
 pub mod frame;
 pub mod ray;
 
 pub use bounds::Bounds;
 pub use color::Rgb;
+pub use direction::PackedDirection;
 pub use frame::Frame;
 pub use glam::{Affine3A, DMat3, DVec3, Mat3, Vec2, Vec3};
 pub use ray::{Interval, Ray};

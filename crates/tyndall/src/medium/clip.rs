@@ -1,7 +1,9 @@
 //! Cutting matter away: half spaces, whose common part is all that is left.
 
 use crate::math::{Bounds, Interval, Ray, Vec3};
+use crate::simd::Lanes;
 use crate::volume::Grid;
+use fearless_simd::prelude::*;
 
 /// A cut in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +56,21 @@ impl Clip {
             }
         }
         Self { half_spaces }
+    }
+
+    /// Whether a place of index space per lane is left.
+    #[inline(always)]
+    pub(super) fn keeps_lanes<S: Lanes>(
+        &self,
+        simd: S,
+        [x, y, z]: [S::f32s; 3],
+        mut kept: S::mask32s,
+    ) -> S::mask32s {
+        for HalfSpace { normal, offset } in &self.half_spaces {
+            let along = x * normal.x + y * normal.y + z * normal.z;
+            kept &= along.simd_le(S::f32s::splat(simd, *offset));
+        }
+        kept
     }
 
     /// The part of a stretch of an index-space ray that is left.

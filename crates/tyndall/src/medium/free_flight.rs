@@ -4,7 +4,7 @@
 //! the largest extinction. Where these agree the cell is homogeneous and nothing is looked up. A step too
 //! short for single precision still goes on by the last place, so that no walk stands still.
 
-use super::{MOST_LANES, Medium, Track};
+use super::{CellStretch, MOST_LANES, Medium, Track};
 use crate::math::Vec3;
 use crate::sampling::Stream;
 use crate::simd::{Kernel, Lanes, Level};
@@ -27,6 +27,24 @@ pub struct Collision {
     pub value: f32,
 }
 
+/// What hears of all that a flight reads.
+pub(crate) trait FlightNotes {
+    /// The bounds of a cell.
+    fn cell(&mut self, cell: usize);
+
+    /// The opacity of a data value.
+    fn value(&mut self, value: f32);
+}
+
+/// Nobody listens.
+impl FlightNotes for () {
+    #[inline(always)]
+    fn cell(&mut self, _: usize) {}
+
+    #[inline(always)]
+    fn value(&mut self, _: f32) {}
+}
+
 impl Medium {
     /// Flies to the next real collision, or out of the medium (`None`): delta tracking
     /// \[Woodcock65\] with local majorants \[Yue10\].
@@ -36,8 +54,34 @@ impl Medium {
     #[inline]
     #[must_use]
     pub fn free_flight(&self, track: &Track, first: f32, stream: &mut Stream) -> Option<Collision> {
+        self.fly(track, self.majorants.walk(track), first, stream, &mut ())
+    }
+
+    /// [`Self::free_flight`] that tells all that it reads, and that nothing else can change: the numbers that it draws depend
+    /// on the bounds of each cell that it crosses, and on no other's.
+    #[inline]
+    pub(crate) fn free_flight_noting(
+        &self,
+        track: &Track,
+        first: f32,
+        stream: &mut Stream,
+        notes: &mut impl FlightNotes,
+    ) -> Option<Collision> {
+        self.fly(track, self.majorants.walk_singly(track), first, stream, notes)
+    }
+
+    #[inline(always)]
+    fn fly(
+        &self,
+        track: &Track,
+        cells: impl Iterator<Item = CellStretch>,
+        first: f32,
+        stream: &mut Stream,
+        notes: &mut impl FlightNotes,
+    ) -> Option<Collision> {
         let mut depth = first;
-        for cell in self.majorants.walk(track) {
+        for cell in cells {
+            notes.cell(cell.cell);
             let majorant = cell.most * self.density;
             let mut t = cell.start;
             // False at once in an empty cell, where the step is infinite or 0/0.
@@ -46,6 +90,7 @@ impl Medium {
                 let place = track.at(t);
                 let level = stream.uniform() * cell.most;
                 let value = self.volume.value(place);
+                notes.value(value);
                 // Below the smallest opacity the collision is real whatever stands there.
                 if level < cell.least || level < self.transfer.opacity(value) {
                     return Some(Collision { t, place, value });

@@ -30,6 +30,8 @@ pub struct CellStretch {
     pub least: f32,
     /// Largest opacity in the cell.
     pub most: f32,
+    /// The cell's number, x fastest; the first one's of several.
+    pub cell: usize,
 }
 
 impl MajorantGrid {
@@ -67,22 +69,34 @@ impl MajorantGrid {
         self.edge
     }
 
+    /// Voxels along a cell's edge, as a whole number.
+    pub(crate) fn voxels(&self) -> usize {
+        cast::index(self.edge)
+    }
+
     /// Per cell how many cells on to each side end what is empty around it, itself included; 0 where there is matter.
     pub(super) fn empty(&self) -> &[u8] {
         &self.empty
     }
 
-    /// The cells along a track in order.
+    /// The cells along a track in order, those that are alike in one stretch.
     #[inline]
     #[must_use]
     pub fn walk(&self, track: &Track) -> CellWalk<'_> {
         CellWalk::new(self, track)
     }
+
+    /// The cells along a track in order, each by itself: where stretches begin and end does not depend on what is in them.
+    #[inline]
+    #[must_use]
+    pub fn walk_singly(&self, track: &Track) -> CellWalk<'_, false> {
+        CellWalk::new(self, track)
+    }
 }
 
-/// Goes along a track from cell to cell; the stretches join without gaps.
+/// Goes along a track from cell to cell, at once over those that are `ALIKE` if told so; the stretches join without gaps.
 #[derive(Clone, Debug)]
-pub struct CellWalk<'a> {
+pub struct CellWalk<'a, const ALIKE: bool = true> {
     grid: &'a MajorantGrid,
     /// Where the track begins, and where it goes, in cells.
     entry: Vec3,
@@ -97,7 +111,7 @@ pub struct CellWalk<'a> {
     length: f32,
 }
 
-impl<'a> CellWalk<'a> {
+impl<'a, const ALIKE: bool> CellWalk<'a, ALIKE> {
     #[inline]
     fn new(grid: &'a MajorantGrid, track: &Track) -> Self {
         let per_cell = 1.0 / grid.edge;
@@ -139,7 +153,7 @@ impl<'a> CellWalk<'a> {
     }
 }
 
-impl Iterator for CellWalk<'_> {
+impl<const ALIKE: bool> Iterator for CellWalk<'_, ALIKE> {
     type Item = CellStretch;
 
     // Kernels over lanes must find it inside themselves.
@@ -150,7 +164,7 @@ impl Iterator for CellWalk<'_> {
             let [x, y, z] = self.place;
             let (x, y, z) = (x as isize, y as isize, z as isize);
             let cell = (x + nx * (y + ny * z)).cast_unsigned();
-            let reach = i32::from(self.grid.reach[cell]);
+            let reach = if ALIKE { i32::from(self.grid.reach[cell]) } else { 0 };
             let (through, leave) = if reach == 0 { nearest(self.next) } else { nearest(self.exits(reach)) };
             let start = self.start;
             let end = leave.min(self.length);
@@ -160,14 +174,14 @@ impl Iterator for CellWalk<'_> {
             if end > start {
                 self.start = end;
                 let [least, most] = self.grid.opacities[cell];
-                return Some(CellStretch { start, end, least, most });
+                return Some(CellStretch { start, end, least, most, cell });
             }
         }
         None
     }
 }
 
-impl CellWalk<'_> {
+impl<const ALIKE: bool> CellWalk<'_, ALIKE> {
     /// Into the next cell through the border of `axis` at distance `leave`.
     #[inline]
     fn step(&mut self, through: usize, leave: f32, reach: i32) {

@@ -5,7 +5,7 @@
 //! decided for each sample by the cell that it lies in.
 
 use super::{Medium, Track};
-use crate::math::cast;
+use crate::math::{Ray, cast};
 use crate::simd::{Kernel, Lanes, Level};
 use fearless_simd::prelude::*;
 
@@ -29,6 +29,12 @@ impl Steps {
         let rest = (track.length - whole as f32 * step).max(0.0);
         // A sliver of the last bit would be a step of no width.
         Self { whole, count: whole + i32::from(rest > 1e-4 * step), rest }
+    }
+
+    #[inline(always)]
+    fn midpoint(&self, k: i32, step: f32) -> f32 {
+        let width = if k < self.whole { step } else { self.rest };
+        k as f32 * step + 0.5 * width
     }
 }
 
@@ -82,6 +88,35 @@ impl Medium {
         }
         if along.count > 0 { along.take() } else { along.thickness() }
     }
+}
+
+/// What hears of all that the lanes of a packet read.
+pub(crate) trait MarchNotes<S: Lanes> {
+    /// Whether what is empty is crossed cell by cell, so that each is told.
+    const EACH_CELL: bool;
+
+    /// Values that some lanes read.
+    fn values(&mut self, simd: S, lanes: S::mask32s, values: S::f32s);
+
+    /// Values that a lane reads about its sample.
+    fn values_about(&mut self, simd: S, lane: usize, read: S::mask32s, values: S::f32s);
+
+    /// Numbers of the empty cells that some lanes leap over, x fastest.
+    fn cells(&mut self, simd: S, lanes: S::mask32s, cells: S::u32s);
+}
+
+/// Nobody listens.
+impl<S: Lanes> MarchNotes<S> for () {
+    const EACH_CELL: bool = false;
+
+    #[inline(always)]
+    fn values(&mut self, _: S, _: S::mask32s, _: S::f32s) {}
+
+    #[inline(always)]
+    fn values_about(&mut self, _: S, _: usize, _: S::mask32s, _: S::f32s) {}
+
+    #[inline(always)]
+    fn cells(&mut self, _: S, _: S::mask32s, _: S::u32s) {}
 }
 
 /// A march along a packet of tracks, at most one per lane. Each lane takes the steps of its own track that may hold
@@ -154,9 +189,22 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
         self.active = k.simd_lt(self.count);
     }
 
+    /// Goes on with certain steps up to others, not included, where each lane's track does not end before.
+    #[inline(always)]
+    pub fn go_between(&mut self, k: S::i32s, end: S::i32s) {
+        self.count = self.count.min(end);
+        self.go_to(k);
+    }
+
     /// The next samples of which one at least met matter.
     #[inline(always)]
     pub fn next(&mut self) -> Option<PacketSample<S>> {
+        self.next_noting(&mut ())
+    }
+
+    /// [`Self::next`] that tells all that it reads. No lane's bits depend on what is in the others.
+    #[inline(always)]
+    pub fn next_noting<N: MarchNotes<S>>(&mut self, notes: &mut N) -> Option<PacketSample<S>> {
         let simd = self.simd;
         let zero = S::f32s::splat(simd, 0.0);
         while self.active.any_true() {
@@ -167,7 +215,8 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
             let mut here = self.active;
             self.k = k + 1;
             if self.occupied == 0 {
-                let cells = self.skip.cells(place);
+                let cells = self.skip.cells::<N>(place);
+                notes.cells(simd, here & cells.empty, cells.number);
                 let leap = self.skip.leap(k, &cells);
                 here &= !cells.empty;
                 self.k = cells.empty.select(leap, self.k);
@@ -186,6 +235,7 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
             }
             self.active &= self.k.simd_lt(self.count);
             let value = self.medium.volume.value_lanes(simd, place);
+            notes.values(simd, here, value);
             let opacity = self.medium.transfer.opacity_lanes(simd, value);
             let thickness = here.select(opacity * width * self.medium.density, zero);
             if thickness.simd_gt(zero).any_true() {
@@ -213,6 +263,28 @@ fn at<S: Lanes>(origin: [S::f32s; 3], direction: [S::f32s; 3], t: S::f32s) -> [S
 }
 
 impl Track {
+    /// Steps of a march along it.
+    #[must_use]
+    pub fn steps(&self, step: f32) -> i32 {
+        Steps::new(self, step).count
+    }
+
+    /// The same stretch, but for as much less than a step by which its steps begin later.
+    #[must_use]
+    pub fn shifted(&self, by: f32) -> Self {
+        Self {
+            ray: Ray::new(self.ray.at(by), self.ray.direction),
+            length: self.length,
+            before: self.before + by,
+        }
+    }
+
+    /// The middle of a step.
+    #[must_use]
+    pub fn midpoint(&self, k: i32, step: f32) -> f32 {
+        Steps::new(self, step).midpoint(k, step)
+    }
+
     /// Index-space places at distances inside the medium.
     #[inline(always)]
     pub(super) fn lanes<S: Lanes>(&self, simd: S, t: S::f32s) -> [S::f32s; 3] {
@@ -243,8 +315,7 @@ impl<'a, S: Lanes> Along<'a, S> {
 
     #[inline(always)]
     fn midpoint(&self, k: i32) -> f32 {
-        let width = if k < self.steps.whole { self.step } else { self.steps.rest };
-        k as f32 * self.step + 0.5 * width
+        self.steps.midpoint(k, self.step)
     }
 
     /// Whether the lanes are now full.
@@ -301,6 +372,7 @@ struct LaneCells<S: Lanes> {
     empty: S::mask32s,
     /// Cells to where that ends; 0 where there is matter.
     extent: S::i32s,
+    number: S::u32s,
 }
 
 impl<'a, S: Lanes> Skip<'a, S> {
@@ -325,11 +397,13 @@ impl<'a, S: Lanes> Skip<'a, S> {
     }
 
     #[inline(always)]
-    fn cells(&self, place: [S::f32s; 3]) -> LaneCells<S> {
+    fn cells<N: MarchNotes<S>>(&self, place: [S::f32s; 3]) -> LaneCells<S> {
         let place = [self.cell(place[0], 0), self.cell(place[1], 1), self.cell(place[2], 2)];
         let number: S::u32s = (place[0] + (place[1] + place[2] * self.dims[1]) * self.dims[0]).bitcast();
         let extent: S::i32s = (self.simd.words(self.empty, number) & 0xff).bitcast();
-        LaneCells { place, empty: extent.simd_gt(S::i32s::splat(self.simd, 0)), extent }
+        let empty = extent.simd_gt(S::i32s::splat(self.simd, 0));
+        let extent = if N::EACH_CELL { extent.min(S::i32s::splat(self.simd, 1)) } else { extent };
+        LaneCells { place, empty, extent, number }
     }
 
     #[inline(always)]

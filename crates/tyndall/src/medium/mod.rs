@@ -10,13 +10,16 @@ mod reach;
 
 pub use clip::{Clip, ClipShape};
 pub use free_flight::Collision;
+pub(crate) use free_flight::FlightNotes;
 pub use majorants::{CellStretch, CellWalk, MajorantGrid};
-pub(crate) use march::{MOST_LANES, PacketMarch};
+pub(crate) use march::{MOST_LANES, MarchNotes, PacketMarch};
 
 use crate::math::{Interval, Ray, Vec3, cast};
 use crate::scattering::{Brdf, Event, Phase, Surface, surface_share};
+use crate::simd::Lanes;
 use crate::transfer::{Optics, TransferFunction};
 use crate::volume::Volume;
+use fearless_simd::prelude::*;
 use std::sync::Arc;
 
 /// What a medium is made of; see [`Medium::new`].
@@ -171,6 +174,17 @@ impl Medium {
     #[must_use]
     pub fn contains(&self, p: Vec3) -> bool {
         self.volume.grid().index_bounds().contains(p) && self.clip.keeps(p)
+    }
+
+    /// [`Self::contains`] of a place per lane.
+    #[inline(always)]
+    pub(crate) fn contains_lanes<S: Lanes>(&self, simd: S, [x, y, z]: [S::f32s; 3]) -> S::mask32s {
+        let box_ = self.volume.grid().index_bounds();
+        let (lo, hi) = (box_.min, box_.max);
+        let mut inside = x.simd_ge(S::f32s::splat(simd, lo.x)) & x.simd_le(S::f32s::splat(simd, hi.x));
+        inside &= y.simd_ge(S::f32s::splat(simd, lo.y)) & y.simd_le(S::f32s::splat(simd, hi.y));
+        inside &= z.simd_ge(S::f32s::splat(simd, lo.z)) & z.simd_le(S::f32s::splat(simd, hi.z));
+        self.clip.keeps_lanes(simd, [x, y, z], inside)
     }
 
     /// Extinction per world unit at an index-space place.

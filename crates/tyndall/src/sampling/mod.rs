@@ -4,12 +4,14 @@
 //! same numbers, on any thread.
 
 mod discrete;
+mod light_path;
 mod philox;
 mod sampler;
 mod stream;
 pub mod warp;
 
 pub use discrete::Discrete;
+pub use light_path::LightPathSampler;
 pub use philox::philox;
 pub use sampler::{BounceSample, PathSampler};
 pub use stream::Stream;

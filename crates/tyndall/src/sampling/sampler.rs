@@ -5,10 +5,10 @@ use super::{Stream, philox};
 use sobol_burley::sample_4d;
 
 /// Bounces that draw from the Sobol sequence; past these a better spread no longer pays.
-const SOBOL_BOUNCES: u32 = 12;
+pub(super) const SOBOL_BOUNCES: u32 = 12;
 
 /// Points of a Sobol sequence before it is scrambled anew.
-const SEQUENCE: u32 = 1 << 16;
+pub(super) const SEQUENCE: u32 = 1 << 16;
 
 /// The numbers of one scattering event, each in [0, 1).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -141,6 +141,13 @@ impl Event {
         (matter + surface > 0.0).then(|| surface / (matter + surface))
     }
 
+    /// Whether a surface has a share in it.
+    #[inline]
+    #[must_use]
+    pub fn is_surface(&self) -> bool {
+        self.side().1 > 0.0
+    }
+
     /// The normal and the share of the surface; without a normal, none.
     #[inline]
     fn side(&self) -> (Vec3, f32) {

@@ -1,14 +1,14 @@
 //! From the checked document to the scene: what was left to choice is chosen here, by the volume.
 
 use super::document::{self, Document};
-use super::{Background, IntegratorKind, RenderSettings, Scene};
+use super::{Background, IntegratorKind, PhotonSettings, RenderSettings, Scene, SpatialHistory};
 use crate::camera::{AutoView, Camera, FitLens, Lens, fit};
 use crate::light::{Directional, Disk, Environment, Light, LightSet, Map, PointLight, Rect, SphereLight};
 use crate::math::{Bounds, Frame, Rgb, Vec3, cast};
 use crate::medium::{ClipShape, Medium, MediumSettings};
 use crate::message::excerpt;
 use crate::scattering::{Abc, Brdf, HenyeyGreenstein, Phase, Schlick};
-use crate::transfer::{Optics, PRESETS, Point, Preset, TransferFunction};
+use crate::transfer::{Grouping, Optics, PRESETS, Point, Preset, TransferFunction};
 use crate::volume::{Space, Volume};
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -266,6 +266,26 @@ fn render_settings(document: &Document) -> RenderSettings {
             light_samples: render.raymarch.light_samples,
         },
         document::Integrator::Path => IntegratorKind::Path,
+        document::Integrator::Photon => IntegratorKind::Photon(photon_settings(&render.photon)),
     };
     RenderSettings { integrator, max_scatter: render.max_scatter, seed: render.seed }
+}
+
+fn photon_settings(settings: &document::PhotonSettings) -> PhotonSettings {
+    PhotonSettings {
+        photons: settings.photons,
+        radius: settings.radius,
+        segments: settings.segments,
+        steps_per_voxel: settings.steps_per_voxel,
+        history_bits: u8::try_from(settings.history_bits).unwrap_or(128),
+        bins: match settings.bins {
+            document::HistoryBins::Quantile => Grouping::Quantile,
+            document::HistoryBins::Uniform => Grouping::Uniform,
+        },
+        spatial: match settings.spatial {
+            document::SpatialHistory::Cells => SpatialHistory::Cells,
+            document::SpatialHistory::Axes => SpatialHistory::Axes,
+            document::SpatialHistory::Off => SpatialHistory::Off,
+        },
+    }
 }

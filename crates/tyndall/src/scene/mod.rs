@@ -11,6 +11,7 @@ use crate::camera::Camera;
 use crate::light::LightSet;
 use crate::math::{Rgb, Vec3};
 use crate::medium::Medium;
+use crate::transfer::Grouping;
 use std::sync::Arc;
 
 /// Everything that decides a picture.
@@ -66,6 +67,39 @@ pub enum IntegratorKind {
     },
     /// Unbiased Monte Carlo.
     Path,
+    /// Photon mapping that survives edits.
+    Photon(PhotonSettings),
+}
+
+/// Settings of photon mapping; lengths in voxels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhotonSettings {
+    /// Light paths, of all lights together.
+    pub photons: u32,
+    /// Radius of gathering; positive.
+    pub radius: f32,
+    /// Segments of each view ray; at least 1.
+    pub segments: u32,
+    /// Steps of a view ray in each voxel; positive.
+    pub steps_per_voxel: f32,
+    /// Groups of values in a Historygram, 1 to 128.
+    pub history_bits: u8,
+    /// How values are put into groups.
+    pub bins: Grouping,
+    /// How segments learn which photons changed.
+    pub spatial: SpatialHistory,
+}
+
+/// How segments learn which photons changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SpatialHistory {
+    /// By a bit for each cell of the photon map: exact.
+    #[default]
+    Cells,
+    /// By 64 bits along each axis \[Jonsson12, sec. 4.3.2\]: exact, but soon true everywhere.
+    Axes,
+    /// Not at all: segments keep the light that they had, which is wrong.
+    Off,
 }
 
 impl IntegratorKind {
@@ -75,6 +109,7 @@ impl IntegratorKind {
         match self {
             Self::RayMarch { .. } => "raymarch",
             Self::Path => "path",
+            Self::Photon(_) => "photon",
         }
     }
 }

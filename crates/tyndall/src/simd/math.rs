@@ -1,6 +1,7 @@
 //! Functions that the lanes' library lacks.
 
 use super::Lanes;
+use crate::math::direction::HALF;
 use fearless_simd::prelude::*;
 
 /// `1 - exp(-x)` for `x >= 0`, to 3e-7 of itself: the share of light that an optical thickness takes.
@@ -25,11 +26,60 @@ pub(crate) fn one_minus_exp<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
 const LN_2_HIGH: f32 = 0.693_359_4;
 const LN_2_LOW: f32 = -2.121_944_4e-4;
 
+/// The unit vectors of [`PackedDirection`](crate::math::PackedDirection)s.
+#[inline(always)]
+pub(crate) fn unpack_directions<S: Lanes>(simd: S, words: S::u32s) -> [S::f32s; 3] {
+    let (low, high): (S::i32s, S::i32s) = ((words & 0xffff).bitcast(), (words >> 16).bitcast());
+    let zero = S::f32s::splat(simd, 0.0);
+    let scale = S::f32s::splat(simd, 1.0 / HALF);
+    let x = (low.to_float::<S::f32s>() - (HALF + 1.0)) * scale;
+    let y = (high.to_float::<S::f32s>() - (HALF + 1.0)) * scale;
+    let z = S::f32s::splat(simd, 1.0) - x.abs() - y.abs();
+    let fold = (-z).max(zero);
+    let [x, y] = [x - fold.copysign(x), y - fold.copysign(y)];
+    let scale = S::f32s::splat(simd, 1.0) / (x * x + y * y + z * z).sqrt();
+    [x * scale, y * scale, z * scale]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::cast;
+    use crate::math::{PackedDirection, Vec3, cast};
     use crate::simd::{Kernel, Level};
+
+    struct Unpack<'a>(&'a [u32]);
+
+    impl Kernel for Unpack<'_> {
+        type Output = Vec<Vec3>;
+
+        #[inline(always)]
+        fn run<S: Lanes>(self, simd: S) -> Vec<Vec3> {
+            let mut found = Vec::new();
+            for words in self.0.chunks_exact(S::WIDTH) {
+                let [x, y, z] = unpack_directions(simd, S::u32s::from_slice(simd, words));
+                let of = |lane: usize| Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
+                found.extend((0..S::WIDTH).map(of));
+            }
+            found
+        }
+    }
+
+    #[test]
+    fn every_level_unpacks_the_same_directions() {
+        let words: Vec<u32> = (0..4096_u32)
+            .map(|i| {
+                let z = 1.0 - 2.0 * (i as f32 + 0.5) / 4096.0;
+                let (s, c) = (i as f32 * 2.4).sin_cos();
+                PackedDirection::new(Vec3::new((1.0 - z * z).sqrt() * c, (1.0 - z * z).sqrt() * s, z)).word()
+            })
+            .collect();
+        for level in Level::available() {
+            for (&word, found) in words.iter().zip(level.run(Unpack(&words))) {
+                let expected = PackedDirection::from_word(word).unpack();
+                assert!((found - expected).length() < 3e-7, "{found}, expected {expected} with {level:?}");
+            }
+        }
+    }
 
     struct Shares<'a>(&'a [f32]);
 

@@ -9,7 +9,7 @@ mod gather;
 mod math;
 
 pub(crate) use gather::Lanes;
-pub(crate) use math::one_minus_exp;
+pub(crate) use math::{one_minus_exp, unpack_directions};
 
 use fearless_simd as simd;
 use std::fmt;

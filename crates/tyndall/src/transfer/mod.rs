@@ -6,10 +6,12 @@
 
 mod difference;
 mod glow;
+mod historygram;
 mod presets;
 mod table;
 
 pub use difference::{BinSet, TransferDifference};
+pub use historygram::{Grouping, HistoryGroups, Historygram};
 pub use presets::{PRESETS, Preset};
 
 use crate::math::{Rgb, cast};

@@ -69,6 +69,15 @@ impl Cells {
         pick(place.x, nx) + nx * (pick(place.y, ny) + ny * pick(place.z, nz))
     }
 
+    /// The cells that meet the box that reaches so far from an index-space place along each axis.
+    pub fn cells_within(&self, p: Vec3, reach: Vec3) -> impl Iterator<Item = usize> {
+        let [first, last] = [p - reach, p + reach].map(|p| place(self.cell_at(p), self.dims));
+        let [nx, ny, _] = self.dims;
+        (first[2]..=last[2]).flat_map(move |z| {
+            (first[1]..=last[1]).flat_map(move |y| (first[0]..=last[0]).map(move |x| x + nx * (y + ny * z)))
+        })
+    }
+
     /// The part of index space that a cell covers in the medium's box.
     #[must_use]
     pub fn cell_bounds(&self, cell: usize, medium: &Bounds) -> Bounds {

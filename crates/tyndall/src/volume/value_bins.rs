@@ -1,6 +1,8 @@
 //! Equal bins over the data's values, in which tables of optics and histories of light are kept.
 
 use crate::math::cast;
+use crate::simd::Lanes;
+use fearless_simd::prelude::*;
 
 /// [`Self::INSIDE`] equal bins over a range of values, one more for all below it, and one for all above.
 ///
@@ -64,6 +66,14 @@ impl ValueBins {
     #[must_use]
     pub fn value(self, place: f32) -> f32 {
         ((place - 1.0) / self.per_half + self.half_first) * 2.0
+    }
+
+    /// [`Self::bin`] of a value per lane.
+    #[inline(always)]
+    pub(crate) fn bin_lanes<S: Lanes>(self, simd: S, values: S::f32s) -> S::i32s {
+        let top = S::f32s::splat(simd, (Self::COUNT - 1) as f32);
+        // Without fused operations, as in `place`.
+        ((values * 0.5 - self.half_first) * self.per_half + 1.0).max(0.0).min(top).to_int()
     }
 
     /// The bin of a value.

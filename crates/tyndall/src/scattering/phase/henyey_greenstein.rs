@@ -1,8 +1,10 @@
 //! The Henyey-Greenstein phase function \[HG41\].
 
-use super::PhaseError;
+use super::{PhaseError, drop_lanes};
 use crate::math::Vec3;
 use crate::scattering::deflect;
+use crate::simd::Lanes;
+use fearless_simd::prelude::*;
 use std::f32::consts::PI;
 
 /// One lobe, set by its mean cosine `g` \[HG41\]:
@@ -33,6 +35,15 @@ impl HenyeyGreenstein {
     #[must_use]
     pub fn eval_between(self, w: Vec3, after: Vec3) -> f32 {
         self.at_drop(0.5 * (w * self.side() - after).length_squared())
+    }
+
+    /// [`Self::eval_between`] of directions in lanes.
+    #[inline(always)]
+    pub(super) fn eval_between_lanes<S: Lanes>(self, simd: S, w: [S::f32s; 3], after: Vec3) -> S::f32s {
+        let g = self.g.abs();
+        let gap = 1.0 - g;
+        let d = drop_lanes(simd, w, self.side(), after) * (2.0 * g) + gap * gap;
+        S::f32s::splat(simd, gap * (1.0 + g) / (4.0 * PI)) / (d * d.sqrt())
     }
 
     /// Density at `1 - cos` from the lobe's axis. There `1 + g^2 - 2 g cos` is a sum of positive terms.

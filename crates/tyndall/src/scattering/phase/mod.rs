@@ -12,6 +12,8 @@ pub use schlick::Schlick;
 
 use crate::math::Vec3;
 use crate::sampling::warp;
+use crate::simd::Lanes;
+use fearless_simd::prelude::*;
 use std::f32::consts::PI;
 
 /// Why a phase function cannot be.
@@ -63,6 +65,16 @@ impl Phase {
         }
     }
 
+    /// [`Self::eval_between`] of the directions before scattering in lanes.
+    #[inline(always)]
+    pub(crate) fn eval_between_lanes<S: Lanes>(&self, simd: S, w: [S::f32s; 3], after: Vec3) -> S::f32s {
+        match self {
+            Self::Isotropic => S::f32s::splat(simd, 1.0 / (4.0 * PI)),
+            Self::HenyeyGreenstein(lobe) => lobe.eval_between_lanes(simd, w, after),
+            Self::Schlick(lobe) => lobe.eval_between_lanes(simd, w, after),
+        }
+    }
+
     /// Draws the direction after scattering of light that travels along the unit vector `w`,
     /// from two uniform numbers in [0, 1).
     #[inline]
@@ -84,6 +96,14 @@ impl Phase {
             Self::Schlick(lobe) => lobe.mean_cosine(),
         }
     }
+}
+
+/// Half the squared distance of directions in lanes, times `side`, from one: `1 - cos` without its rounding.
+#[inline(always)]
+fn drop_lanes<S: Lanes>(simd: S, [x, y, z]: [S::f32s; 3], side: f32, after: Vec3) -> S::f32s {
+    let splat = |x: f32| S::f32s::splat(simd, x);
+    let (dx, dy, dz) = (x * side - splat(after.x), y * side - splat(after.y), z * side - splat(after.z));
+    (dx * dx + dy * dy + dz * dz) * 0.5
 }
 
 #[cfg(test)]

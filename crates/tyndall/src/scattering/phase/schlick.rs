@@ -1,8 +1,10 @@
 //! Schlick's rational phase function \[Blasi93\].
 
-use super::PhaseError;
+use super::{PhaseError, drop_lanes};
 use crate::math::{Vec3, cast};
 use crate::scattering::deflect;
+use crate::simd::Lanes;
+use fearless_simd::prelude::*;
 use std::f32::consts::PI;
 
 /// A lobe without a root, close to Henyey-Greenstein's \[Blasi93\]:
@@ -35,6 +37,15 @@ impl Schlick {
     #[must_use]
     pub fn eval_between(self, w: Vec3, after: Vec3) -> f32 {
         self.at_drop(0.5 * (w * self.side() - after).length_squared())
+    }
+
+    /// [`Self::eval_between`] of directions in lanes.
+    #[inline(always)]
+    pub(super) fn eval_between_lanes<S: Lanes>(self, simd: S, w: [S::f32s; 3], after: Vec3) -> S::f32s {
+        let k = self.k.abs();
+        let gap = 1.0 - k;
+        let d = drop_lanes(simd, w, self.side(), after) * k + gap;
+        S::f32s::splat(simd, gap * (1.0 + k) / (4.0 * PI)) / (d * d)
     }
 
     /// Density at `1 - cos` from the lobe's axis. There `1 - k cos` is a sum of positive terms.

@@ -47,7 +47,9 @@ pub use film::{Background, Film, Tone};
 pub use light::Light;
 pub use medium::{Brdf, Medium, Phase};
 pub use patch::apply;
-pub use render::{Integrator, PathSettings, RaymarchSettings, Render};
+pub use render::{
+    HistoryBins, Integrator, PathSettings, PhotonSettings, RaymarchSettings, Render, SpatialHistory,
+};
 pub use schema::schema;
 pub use set::set;
 pub use text::{value_from_json, value_from_toml};

@@ -3,7 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::shape::{LightSamples, MajorantCell, Samples, ScatteringOrder, StepLength};
+use super::shape::{
+    HistoryBits, LightSamples, MajorantCell, Photons, Radius, Samples, ScatteringOrder, Segments, StepLength,
+    StepsPerVoxel,
+};
 
 /// How the picture is computed: the method, its effort, and its own settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -29,6 +32,9 @@ pub struct Render {
 
     /// Settings of the integrator `path`.
     pub path: PathSettings,
+
+    /// Settings of the integrator `photon`.
+    pub photon: PhotonSettings,
 }
 
 impl Default for Render {
@@ -40,6 +46,7 @@ impl Default for Render {
             seed: 0,
             raymarch: RaymarchSettings::default(),
             path: PathSettings::default(),
+            photon: PhotonSettings::default(),
         }
     }
 }
@@ -53,6 +60,8 @@ pub enum Integrator {
     /// Unbiased, progressive path tracing through all orders of scattering: the ground truth.
     #[default]
     Path,
+    /// Photon mapping whose photons and view rays survive edits that do not touch them.
+    Photon,
 }
 
 /// Settings of the integrator `raymarch`.
@@ -88,4 +97,73 @@ impl Default for PathSettings {
     fn default() -> Self {
         Self { majorant_cell: 8 }
     }
+}
+
+/// Settings of the integrator `photon`; lengths in voxels (cube root of the voxel volume).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PhotonSettings {
+    /// Light paths that start, of all lights together.
+    #[schemars(with = "Photons")]
+    pub photons: u32,
+
+    /// Radius within which light is gathered: larger is smoother, and blurs. A sphere in world space, whatever the spacing.
+    #[schemars(with = "Radius")]
+    pub radius: f32,
+
+    /// Parts of each view ray that an edit leaves or redoes by themselves.
+    #[schemars(with = "Segments")]
+    pub segments: u32,
+
+    /// Steps of a view ray per voxel.
+    #[schemars(with = "StepsPerVoxel")]
+    pub steps_per_voxel: f32,
+
+    /// Bits of a Historygram: 32, 64 or 128 groups of data values that an edit is told apart by.
+    #[schemars(with = "HistoryBits")]
+    pub history_bits: u32,
+
+    /// How data values are put into these groups.
+    pub bins: HistoryBins,
+
+    /// How a part of a view ray learns that photons near it changed.
+    pub spatial: SpatialHistory,
+}
+
+impl Default for PhotonSettings {
+    fn default() -> Self {
+        Self {
+            photons: 1 << 20,
+            radius: 1.5,
+            segments: 7,
+            steps_per_voxel: 2.0,
+            history_bits: 64,
+            bins: HistoryBins::default(),
+            spatial: SpatialHistory::default(),
+        }
+    }
+}
+
+/// How data values are put into groups that an edit is told apart by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum HistoryBins {
+    /// Groups that hold equally many voxels, as far as that goes.
+    #[default]
+    Quantile,
+    /// Groups equally wide.
+    Uniform,
+}
+
+/// How a part of a view ray learns that photons near it changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SpatialHistory {
+    /// A bit for each cell of the photon map: exact.
+    #[default]
+    Cells,
+    /// 64 bits along each axis: exact, but soon everything counts as changed.
+    Axes,
+    /// Not at all: parts that an edit does not touch keep the light that they had, which is wrong.
+    Off,
 }

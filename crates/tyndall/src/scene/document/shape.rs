@@ -56,6 +56,16 @@ shapes! {
     Samples = { "type": "integer", "format": "uint32", "minimum": 1, "maximum": 2_147_483_648_u32 };
     /// A number of points on a light.
     LightSamples = { "type": "integer", "format": "uint32", "minimum": 1, "maximum": 4096 };
+    /// A number of light paths.
+    Photons = { "type": "integer", "format": "uint32", "minimum": 1, "maximum": 268_435_456_u32 };
+    /// A radius in voxels.
+    Radius = { "type": "number", "format": "float", "minimum": 0.01, "maximum": 1000 };
+    /// A number of parts of a view ray.
+    Segments = { "type": "integer", "format": "uint32", "minimum": 1, "maximum": 256 };
+    /// Steps per voxel.
+    StepsPerVoxel = { "type": "number", "format": "float", "minimum": 0.1, "maximum": 100 };
+    /// Bits of a Historygram: 32, 64 or 128.
+    HistoryBits = { "type": "integer", "format": "uint32", "minimum": 32, "maximum": 128 };
     /// An edge in voxels, or 0.
     MajorantCell = { "type": "integer", "format": "uint32", "minimum": 0, "maximum": 4096 };
     /// A position or a direction in world space.

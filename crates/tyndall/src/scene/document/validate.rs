@@ -20,6 +20,10 @@ pub(super) fn validate(document: &Document) -> Result<(), DocumentError> {
         validate_camera(camera, &mut problems);
     }
     validate_film(&document.film, &mut problems);
+    let bits = document.render.photon.history_bits;
+    if !matches!(bits, 32 | 64 | 128) {
+        problems.push(Problem::new("render.photon.history_bits", bits.to_string(), "32, 64 or 128"));
+    }
     for (i, clip) in document.clip.iter().enumerate() {
         validate_clip(clip, &join("clip", i), &mut problems);
     }

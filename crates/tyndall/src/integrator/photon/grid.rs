@@ -1,0 +1,194 @@
+//! A grid of cells as wide as the gather radius: what lies within the radius of a place lies in its cell or a neighbour's.
+
+use crate::math::{Bounds, Mat3, Vec3, cast};
+use crate::volume::Grid;
+
+/// Cells at most: where the radius would ask for more, they are wider than it.
+const MOST_CELLS: f32 = (1 << 24) as f32;
+
+/// A cell is wider than the radius by more than single precision errs in a place, so that a place put into the cell beside
+/// its own still has all that it gathers in the neighbourhood.
+const MARGIN: f32 = 1e-4;
+
+/// Bits of one axis of the paper's spatial history.
+const AXIS_BITS: f32 = 64.0;
+
+/// Cells over the medium's box in *metric* space: the world about the box's middle, which keeps distances exact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct CellGrid {
+    middle: Vec3,
+    linear: Mat3,
+    origin: Vec3,
+    edge: f32,
+    per_edge: f32,
+    dims: [usize; 3],
+    radius: f32,
+    index_reach: Vec3,
+    /// Index space to a sphere of the radius: where points of the unit ball lie about a place.
+    ball: Mat3,
+}
+
+impl CellGrid {
+    /// Over a volume's box, for a radius in world units.
+    pub fn new(grid: &Grid, radius: f32) -> Self {
+        let zero = grid.index_to_world(Vec3::ZERO);
+        let axis = |v: Vec3| grid.index_to_world(v) - zero;
+        let middle = grid.index_bounds().center();
+        let linear = Mat3::from_cols(axis(Vec3::X), axis(Vec3::Y), axis(Vec3::Z));
+        let around = Bounds::around(grid.index_bounds().corners().map(|p| linear * (p - middle)));
+        let cells = |edge: f32| (around.size() / edge).ceil().max(Vec3::ONE);
+        let mut edge = radius * (1.0 + MARGIN);
+        while cells(edge).element_product() > MOST_CELLS {
+            edge *= 1.1;
+        }
+        let dims = cells(edge).to_array().map(cast::index);
+        // A sphere reaches as far along an axis as that axis's row of the inverse is long.
+        let rows = linear.inverse().transpose();
+        let lengths = Vec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
+        let index_reach = lengths * (radius * (1.0 + MARGIN)) + MARGIN;
+        let ball = linear.inverse() * Mat3::from_diagonal(Vec3::splat(radius));
+        Self {
+            ball,
+            middle,
+            linear,
+            origin: around.min,
+            edge,
+            per_edge: 1.0 / edge,
+            dims,
+            radius,
+            index_reach,
+        }
+    }
+
+    /// Radius of a gather, world units.
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+
+    /// A point of the unit ball, to where in index space it lies about a place.
+    pub fn in_ball(&self, p: Vec3) -> Vec3 {
+        self.ball * p
+    }
+
+    /// How far the radius reaches along each axis of index space.
+    pub fn index_reach(&self) -> Vec3 {
+        self.index_reach
+    }
+
+    /// Number of cells.
+    pub fn len(&self) -> usize {
+        self.dims.iter().product()
+    }
+
+    /// Index space to metric space.
+    #[inline(always)]
+    pub fn to_metric(self, place: Vec3) -> Vec3 {
+        self.linear * (place - self.middle)
+    }
+
+    /// The cell of a metric place, clamped to the grid.
+    #[inline]
+    pub fn cell(&self, p: Vec3) -> [usize; 3] {
+        let along = |axis: usize| self.along(p[axis], axis);
+        [along(0), along(1), along(2)]
+    }
+
+    #[inline(always)]
+    fn along(&self, x: f32, axis: usize) -> usize {
+        cast::index((x - self.origin[axis]) * self.per_edge).min(self.dims[axis] - 1)
+    }
+
+    /// The number of a cell, x fastest.
+    #[inline(always)]
+    pub fn number(&self, [x, y, z]: [usize; 3]) -> usize {
+        x + self.dims[0] * (y + self.dims[1] * z)
+    }
+
+    /// Numbers of a cell and its neighbours.
+    pub fn neighbours(&self, [x, y, z]: [usize; 3]) -> impl Iterator<Item = usize> {
+        let near = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
+        let [nx, ny, nz] = self.dims;
+        near(z, nz).flat_map(move |z| {
+            near(y, ny).flat_map(move |y| near(x, nx).map(move |x| self.number([x, y, z])))
+        })
+    }
+
+    /// The cells that may hold something within the radius of a metric place: first and last along each axis.
+    #[inline(always)]
+    pub fn around(&self, p: Vec3) -> [[usize; 2]; 3] {
+        let r = self.radius;
+        [
+            [self.along(p.x - r, 0), self.along(p.x + r, 0)],
+            [self.along(p.y - r, 1), self.along(p.y + r, 1)],
+            [self.along(p.z - r, 2), self.along(p.z + r, 2)],
+        ]
+    }
+
+    /// Which of 64 bits along each axis a metric place has.
+    pub fn axis_bins(&self, p: Vec3) -> [u32; 3] {
+        [0, 1, 2].map(|axis| self.axis_bin(p[axis], axis))
+    }
+
+    fn axis_bin(&self, x: f32, axis: usize) -> u32 {
+        let share = (x - self.origin[axis]) / (self.edge * self.dims[axis] as f32);
+        cast::fit_u32(cast::index(share * AXIS_BITS).min(63))
+    }
+
+    /// Bits along each axis that lie within the radius of a metric place.
+    pub fn axis_reach(&self, p: Vec3) -> [u64; 3] {
+        let r = self.radius * (1.0 + MARGIN);
+        [0, 1, 2].map(|axis| {
+            let [first, last] = [p[axis] - r, p[axis] + r].map(|x| self.axis_bin(x, axis));
+            u64::MAX << first & u64::MAX >> (63 - last)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::Space;
+    use tyndall_testing::SplitMix;
+
+    fn skewed() -> Grid {
+        let (s, c) = (0.6, 0.8);
+        let direction = [[c, -s, 0.1], [s, c, 0.0], [0.0, 0.0, -0.995]];
+        Grid::new([30, 20, 25], [0.5, 1.0, 2.0], direction, [1e4, -20.0, 5.0], Space::Plain).unwrap()
+    }
+
+    #[test]
+    fn what_is_within_the_radius_is_in_the_cells_around_and_among_the_neighbours() {
+        let grid = skewed();
+        let cells = CellGrid::new(&grid, 1.7);
+        let mut random = SplitMix::new(5);
+        let mut near = 0;
+        for _ in 0..20_000 {
+            let mut pick = || {
+                let u = Vec3::from_array(random.uniforms());
+                grid.index_bounds().min + grid.index_bounds().size() * u
+            };
+            let (a, b) = (pick(), pick());
+            let (p, q) = (cells.to_metric(a), cells.to_metric(b));
+            let apart = grid.index_to_world(a).distance(grid.index_to_world(b));
+            assert!((p.distance(q) - apart).abs() < 1e-2, "{apart}");
+            if p.distance(q) > cells.radius() {
+                continue;
+            }
+            near += 1;
+            let number = cells.number(cells.cell(q));
+            assert!(cells.neighbours(cells.cell(p)).any(|i| i == number));
+            let around = cells.around(p);
+            let at = cells.cell(q);
+            assert!((0..3).all(|a| (around[a][0]..=around[a][1]).contains(&at[a])), "{p} {q}");
+            let (bins, reach) = (cells.axis_bins(q), cells.axis_reach(p));
+            assert!(bins.iter().zip(reach).all(|(bin, reach)| reach >> bin & 1 == 1));
+        }
+        assert!(near > 20, "{near}");
+    }
+
+    #[test]
+    fn a_tiny_radius_asks_for_no_more_cells_than_there_may_be() {
+        let cells = CellGrid::new(&skewed(), 1e-6);
+        assert!(cells.len() <= 1 << 24 && cells.len() > 1 << 22, "{}", cells.len());
+    }
+}

@@ -1,0 +1,194 @@
+//! Photon mapping that survives edits \[Jonsson12\].
+//!
+//! Light paths leave photons where they interact with matter (`paths`), sorted by place (`map`); rays from the camera gather
+//! them, in segments (`segments`). Path and segment know the data values that they read, as a Historygram, so that an
+//! edit of the transfer function redoes those alone that read what it changed. Where photons changed is known too
+//! (`spatial`), for the segments that gather there.
+//!
+//! All is plain data in flat arrays, and everything follows from scene and numbers: what is redone comes out as it would
+//! from nothing, bit for bit. The first sample of every pixel is this *base map*; later ones are refinement passes with
+//! photons of their own and a shrinking radius \[Knaus11\], and start anew after an edit.
+
+mod chunk;
+mod edit;
+mod grid;
+mod histories;
+mod kernel;
+mod lights;
+mod map;
+mod pass;
+mod paths;
+mod segments;
+mod spatial;
+mod view;
+
+pub(crate) use segments::SegmentTile;
+
+use super::Stop;
+use crate::film::Tile;
+use crate::light::Enclosure;
+use crate::scene::{PhotonSettings, Scene, SpatialHistory};
+use crate::simd::Level;
+use crate::transfer::HistoryGroups;
+use grid::CellGrid;
+use lights::{Ground, LightPaths, share, sources, trace};
+use map::{Lit, PhotonMap};
+use pass::Pass;
+use segments::Refine;
+use spatial::Changed;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use view::View;
+
+/// Light paths, photons, and what is known about edits since; the segments lie with their tiles.
+#[derive(Debug)]
+pub struct PhotonMapping {
+    settings: PhotonSettings,
+    ground: Ground,
+    lights: Vec<LightPaths>,
+    /// Of the base map; `None` where photons have changed since.
+    map: Option<PhotonMap>,
+    /// Where photons changed since the segments last asked.
+    places: Changed,
+    /// Whether there may be segments that an edit leaves valid.
+    has_segments: bool,
+    /// The refinement pass that is being made or used.
+    pass: Option<Pass>,
+    /// Paths traced since the last edit.
+    traced: AtomicUsize,
+}
+
+impl PhotonMapping {
+    /// Prepares the paths of a scene, in parallel on the current pool; nothing is traced yet.
+    #[must_use]
+    pub fn new(scene: &Scene, settings: PhotonSettings, level: Level) -> Self {
+        let medium = &*scene.medium;
+        let volume = medium.volume();
+        let groups = HistoryGroups::new(volume, settings.history_bits, settings.bins);
+        let bins = medium.transfer().bins();
+        let cell_values = volume.cells_of(medium.majorants().voxels());
+        let of_cell = |&[lo, hi]: &[f32; 2]| groups.between(bins.bin(lo), bins.bin(hi));
+        let cells = cell_values.ranges().iter().map(of_cell).collect();
+        let grid = CellGrid::new(volume.grid(), settings.radius * volume.grid().voxel_size());
+        // When so many photons have changed, few segments are left that gather none of them.
+        let enough = settings.photons as usize / 2;
+        let places = match settings.spatial {
+            SpatialHistory::Off => Changed::off(),
+            SpatialHistory::Axes => Changed::axes(grid, enough),
+            SpatialHistory::Cells => Changed::cells(grid, cell_values, enough),
+        };
+        let sources = sources(scene);
+        let count = share(settings.photons, sources.len());
+        let paths = |source| LightPaths::new(source, count, scene.render.seed, 0, groups.count());
+        let lights = sources.into_iter().map(paths).collect();
+        Self {
+            settings,
+            ground: Ground { groups, cells, enclosure: Enclosure::new(volume.grid()), level },
+            lights,
+            map: None,
+            places,
+            has_segments: false,
+            pass: None,
+            traced: AtomicUsize::new(0),
+        }
+    }
+
+    /// Makes the photons ready from which a sample is to be taken, those of the base map for the first; false where a stop
+    /// came before.
+    pub(super) fn prepare<'s>(
+        &mut self,
+        scene: &Scene,
+        sample: u32,
+        stop: &(impl Fn() -> Stop<'s> + Sync),
+    ) -> bool {
+        if scene.render.max_scatter == 0 {
+            return true;
+        }
+        if sample > 0 {
+            if self.pass.as_ref().is_none_or(|pass| pass.number != sample) {
+                self.pass = Some(Pass::new(scene, &self.settings, sample, self.ground.groups.count()));
+            }
+            return self.pass.as_mut().is_some_and(|pass| pass.prepare(scene, &self.ground, stop));
+        }
+        let off = Changed::off();
+        let places = if self.has_segments { &self.places } else { &off };
+        let before = self.traced.load(Ordering::Relaxed);
+        let whole = trace(&mut self.lights, scene, &self.ground, 0, places, &self.traced, stop);
+        if self.traced.load(Ordering::Relaxed) > before {
+            self.map = None;
+        }
+        if !whole {
+            return false;
+        }
+        if self.map.is_none() {
+            self.map = Some(sorted(scene, self.settings.radius, &self.lights));
+        }
+        self.has_segments = true;
+        true
+    }
+
+    /// Takes the next sample of every pixel of a tile; false where a stop came first.
+    pub(super) fn refine(
+        &self,
+        scene: &Scene,
+        tile: &mut Tile,
+        segments: &mut Option<SegmentTile>,
+        stop: &Stop,
+    ) -> bool {
+        let step = self.step(scene);
+        if tile.samples() > 0 {
+            let map = self.pass.as_ref().and_then(|pass| pass.map.as_ref());
+            let view = View { scene, map, step };
+            return self.ground.level.run(pass::Refine { view, tile, stop });
+        }
+        let Ground { groups, cells, level, .. } = &self.ground;
+        let per_ray = self.settings.segments as usize;
+        let segments = segments.get_or_insert_with(|| {
+            let pixels = tile.next(usize::MAX).0.len();
+            SegmentTile::new(pixels, per_ray, groups.count())
+        });
+        let view = View { scene, map: self.map.as_ref(), step };
+        level.run(Refine { view, segments, tile, groups, cells, places: &self.places, stop })
+    }
+
+    /// Step of a view ray, world units: short enough that little light is lost in the densest matter within one, since light
+    /// and view then change as fast.
+    fn step(&self, scene: &Scene) -> f32 {
+        const THICKEST: f32 = 0.5;
+        let usual = scene.medium.volume().grid().voxel_size() / self.settings.steps_per_voxel;
+        usual.min(THICKEST / scene.medium.density())
+    }
+
+    /// Paths, and of these the ones traced since the last edit.
+    #[must_use]
+    pub fn paths(&self) -> [usize; 2] {
+        let all = self.lights.iter().map(|light| light.count as usize).sum();
+        [all, self.traced.load(Ordering::Relaxed)]
+    }
+
+    /// Begins to count the paths traced.
+    pub(super) fn count_anew(&self) {
+        self.traced.store(0, Ordering::Relaxed);
+    }
+
+    /// Photons of the base map, once it is made.
+    #[must_use]
+    pub fn photons(&self) -> usize {
+        self.lights.iter().flat_map(|light| &light.chunks).map(|chunk| chunk.photons().len()).sum()
+    }
+
+    /// Bytes kept for paths, photons and their histories.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        let chunks = self.lights.iter().flat_map(|light| &light.chunks);
+        chunks.map(chunk::Chunk::bytes).sum::<usize>() + self.map.as_ref().map_or(0, PhotonMap::bytes)
+    }
+}
+
+/// Sorts the photons of all lights; `radius` in voxels.
+fn sorted(scene: &Scene, radius: f32, lights: &[LightPaths]) -> PhotonMap {
+    let grid = scene.medium.volume().grid();
+    let cells = CellGrid::new(grid, radius * grid.voxel_size());
+    let lit: Vec<Lit> =
+        lights.iter().map(|light| Lit { chunks: &light.chunks, scale: light.scale() }).collect();
+    PhotonMap::new(cells, &lit)
+}

@@ -1,0 +1,240 @@
+//! The photon pass: light paths, each of whose interactions knows what it depends on \[Jonsson12, sec. 3.2, 4.3.1\].
+
+use super::histories::Histories;
+use crate::light::{Emission, Enclosure, Light};
+use crate::math::{PackedDirection, Ray, Rgb, Vec3};
+use crate::medium::{FlightNotes, Medium};
+use crate::sampling::LightPathSampler;
+use crate::scene::Scene;
+use crate::transfer::{HistoryGroups, Historygram};
+use bytemuck::{Pod, Zeroable};
+
+/// Light that arrives where it interacts with matter.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Photon {
+    /// Index space.
+    pub place: [f32; 3],
+    /// In which it travels.
+    pub direction: PackedDirection,
+    /// Flux per unit of its light's colour, times the paths of that light.
+    pub flux: [f32; 3],
+    /// Scatterings before this interaction.
+    pub bounce: u32,
+}
+
+/// So many interactions of a path are all kept, and of the later ones fewer and fewer, with the flux of those left out: the
+/// light of long paths is spread so widely that more would cost memory and no noise.
+const WHOLE: u32 = 4;
+
+impl Photon {
+    /// Chance of being kept.
+    fn chance(&self) -> f32 {
+        WHOLE as f32 / (self.bounce + 1).max(WHOLE) as f32
+    }
+
+    /// Flux of this interaction and those left out like it.
+    pub fn whole_flux(&self) -> Rgb {
+        Rgb::from(self.flux) / self.chance()
+    }
+
+    pub fn index_place(&self) -> Vec3 {
+        Vec3::from_array(self.place)
+    }
+}
+
+/// What an interaction depends on: values met in flight, whose opacity mattered, and values where light scattered, whose
+/// albedo and surfaces mattered. Both with all that came before on the path.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Past {
+    pub flight: Historygram,
+    pub scatter: Historygram,
+}
+
+impl Past {
+    pub const NOTHING: Self = Self { flight: Historygram::EMPTY, scatter: Historygram::EMPTY };
+
+    /// Whether something of it has changed.
+    #[inline]
+    pub fn meets(&self, query: &Self) -> bool {
+        self.flight.meets(query.flight) || self.scatter.meets(query.scatter)
+    }
+
+    pub fn is_empty(&self) -> bool {
+        *self == Self::NOTHING
+    }
+
+    pub fn add(&mut self, other: &Self) {
+        self.flight |= other.flight;
+        self.scatter |= other.scatter;
+    }
+}
+
+/// What light paths start from.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Source<'a> {
+    Light(&'a Light),
+    Matter(&'a Emission),
+}
+
+/// Interactions of paths, one path after the other, with what each depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Interactions {
+    pub photons: Vec<Photon>,
+    flight: Histories,
+    scatter: Histories,
+}
+
+impl Interactions {
+    pub fn new(groups: u8) -> Self {
+        Self { photons: Vec::new(), flight: Histories::new(groups), scatter: Histories::new(groups) }
+    }
+
+    #[inline]
+    pub fn past(&self, i: usize) -> Past {
+        Past { flight: self.flight.get(i), scatter: self.scatter.get(i) }
+    }
+
+    #[inline]
+    fn push(&mut self, photon: Photon, past: &Past) {
+        self.photons.push(photon);
+        self.flight.push(past.flight);
+        self.scatter.push(past.scatter);
+    }
+
+    /// Appends some of another's.
+    pub fn extend(&mut self, other: &Self, range: std::ops::Range<usize>) {
+        self.photons.extend_from_slice(&other.photons[range.clone()]);
+        self.flight.extend(&other.flight, range.clone());
+        self.scatter.extend(&other.scatter, range);
+    }
+
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.photons[..]) + self.flight.bytes() + self.scatter.bytes()
+    }
+}
+
+/// What tracing reads.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Tracer<'a> {
+    pub scene: &'a Scene,
+    pub source: Source<'a>,
+    pub enclosure: &'a Enclosure,
+    pub groups: &'a HistoryGroups,
+    /// Of each majorant cell the groups of values that it can yield, whatever the transfer function.
+    pub cells: &'a [Historygram],
+}
+
+/// Light on its way between two interactions.
+struct Flight {
+    ray: Ray,
+    flux: Rgb,
+    bounce: u32,
+}
+
+/// Writes down what a flight reads.
+struct Notes<'a> {
+    tracer: &'a Tracer<'a>,
+    read: Historygram,
+}
+
+impl FlightNotes for Notes<'_> {
+    #[inline(always)]
+    fn cell(&mut self, cell: usize) {
+        self.read |= self.tracer.cells[cell];
+    }
+
+    #[inline(always)]
+    fn value(&mut self, value: f32) {
+        self.read |= self.tracer.read(value);
+    }
+}
+
+impl Tracer<'_> {
+    fn medium(&self) -> &Medium {
+        &self.scene.medium
+    }
+
+    /// What reading the optics of a value leaves in a history.
+    #[inline(always)]
+    fn read(&self, value: f32) -> Historygram {
+        let bin = self.medium().transfer().bins().bin(value);
+        self.groups.between(bin, bin)
+    }
+
+    /// Traces a path, from its beginning or on from one of its interactions, and gives what the whole of it depends on: also
+    /// what it did not hit.
+    #[inline(always)]
+    pub fn trace(
+        &self,
+        numbers: &LightPathSampler,
+        from: Option<(&Photon, Past)>,
+        found: &mut Interactions,
+    ) -> Past {
+        let mut past = from.map_or(Past::NOTHING, |(_, past)| past);
+        let begun = match from {
+            Some((photon, _)) => self.scatter(photon, numbers, &mut past),
+            None => self.emit(numbers),
+        };
+        let Some(mut flight) = begun else { return past };
+        while let Some(photon) = self.fly(&flight, numbers, &mut past) {
+            if numbers.bounce(photon.bounce).light_choice < photon.chance() {
+                found.push(photon, &past);
+            }
+            if photon.bounce + 1 >= self.scene.render.max_scatter {
+                break;
+            }
+            let Some(next) = self.scatter(&photon, numbers, &mut past) else { break };
+            flight = next;
+        }
+        past
+    }
+
+    fn emit(&self, numbers: &LightPathSampler) -> Option<Flight> {
+        let u = numbers.emission();
+        let emitted = match self.source {
+            Source::Light(light) => light.emit(self.enclosure, u),
+            Source::Matter(glow) => glow.emit(self.medium(), u, &mut numbers.stream(u32::MAX)),
+        }?;
+        Some(Flight { ray: emitted.ray, flux: emitted.flux, bounce: 0 })
+    }
+
+    /// To where light interacts next \[Jonsson12, eq. 6\], by tracking: without bias, and cheaper than to march.
+    #[inline(always)]
+    fn fly(&self, flight: &Flight, numbers: &LightPathSampler, past: &mut Past) -> Option<Photon> {
+        let track = self.medium().track(&flight.ray, f32::INFINITY);
+        let mut notes = Notes { tracer: self, read: past.flight };
+        let first = numbers.bounce(flight.bounce).flight_depth();
+        let mut stream = numbers.stream(flight.bounce);
+        let collision = self.medium().free_flight_noting(&track, first, &mut stream, &mut notes);
+        past.flight = notes.read;
+        let collision = collision?;
+        Some(Photon {
+            place: collision.place.to_array(),
+            direction: PackedDirection::new(flight.ray.direction),
+            flux: flight.flux.to_array(),
+            bounce: flight.bounce,
+        })
+    }
+
+    /// Scatters light on, or takes it away \[Jonsson12, eq. 7\]: it survives with the chance that its brightest channel
+    /// does, which depends on the place alone and not on what the path carries, so that no channel's light ends another's.
+    #[inline(always)]
+    fn scatter(&self, photon: &Photon, numbers: &LightPathSampler, past: &mut Past) -> Option<Flight> {
+        let place = photon.index_place();
+        let value = self.medium().volume().value(place);
+        past.scatter |= self.read(value);
+        let event = self.medium().event(place, &self.medium().transfer().optics(value));
+        let u = numbers.bounce(photon.bounce);
+        let scattered = event.sample_adjoint(-photon.direction.unpack(), u.scatter)?;
+        let survival = scattered.weight.max_component().min(1.0);
+        if u.roulette >= survival {
+            return None;
+        }
+        Some(Flight {
+            ray: Ray::new(self.medium().volume().grid().index_to_world(place), scattered.direction),
+            flux: Rgb::from(photon.flux) * (scattered.weight / survival),
+            bounce: photon.bounce + 1,
+        })
+    }
+}

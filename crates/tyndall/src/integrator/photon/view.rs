@@ -1,0 +1,158 @@
+//! Rays from the camera through matter that photons light \[Jonsson12, eq. 2\]: stretches of rays, a packet at a time.
+
+use super::map::{Gathering, PhotonMap};
+use crate::math::{Ray, Rgb, Vec3};
+use crate::medium::{MOST_LANES, MarchNotes, PacketMarch, Track};
+use crate::scene::Scene;
+use crate::simd::{Lanes, one_minus_exp};
+use crate::transfer::{HistoryGroups, Historygram};
+use crate::volume::ValueBins;
+use fearless_simd::prelude::*;
+
+/// Transmittance below which what is behind no longer shows.
+pub(super) const OPAQUE: f32 = 1e-4;
+
+/// What viewing reads.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View<'a> {
+    pub scene: &'a Scene,
+    /// `None` where nothing scatters.
+    pub map: Option<&'a PhotonMap>,
+    /// World units.
+    pub step: f32,
+}
+
+/// Stretches of rays, one per lane.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretches {
+    pub rays: [Ray; MOST_LANES],
+    pub tracks: [Track; MOST_LANES],
+    /// First step and the one after the last; lanes without a stretch have none.
+    pub from: [i32; MOST_LANES],
+    pub to: [i32; MOST_LANES],
+}
+
+impl Default for Stretches {
+    fn default() -> Self {
+        Self {
+            rays: [Ray::default(); MOST_LANES],
+            tracks: [Track::default(); MOST_LANES],
+            from: [0; MOST_LANES],
+            to: [0; MOST_LANES],
+        }
+    }
+}
+
+/// What a stretch of a ray shows by itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Stretch {
+    pub radiance: Rgb,
+    pub transmittance: f32,
+    /// Sum of the distances inside the medium, weighted by what they cover.
+    pub depth: f32,
+}
+
+impl View<'_> {
+    /// Marches all stretches to their ends, or to where they are opaque. What a lane finds does not depend on the others.
+    #[inline(always)]
+    pub fn march<S: Lanes, N: MarchNotes<S>>(
+        &self,
+        simd: S,
+        stretches: &Stretches,
+        notes: &mut N,
+    ) -> [Stretch; MOST_LANES] {
+        let mut radiance = [Rgb::BLACK; MOST_LANES];
+        let zero = S::f32s::splat(simd, 0.0);
+        let (mut alpha, mut depth) = (zero, zero);
+        let mut march = PacketMarch::<S>::new(simd, &self.scene.medium, &stretches.tracks, self.step);
+        let ends = |k: &[i32; MOST_LANES]| S::i32s::from_slice(simd, &k[..S::WIDTH]);
+        march.go_between(ends(&stretches.from), ends(&stretches.to));
+        while let Some(sample) = march.next_noting(notes) {
+            let covered = one_minus_exp(simd, sample.thickness) * (-alpha + 1.0);
+            for (lane, radiance) in radiance.iter_mut().enumerate().take(S::WIDTH) {
+                let covered = covered.as_slice()[lane];
+                if covered > 0.0 {
+                    let [x, y, z] = sample.place;
+                    let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
+                    let w_out = -stretches.rays[lane].direction;
+                    let value = sample.value.as_slice()[lane];
+                    *radiance += self.source(simd, place, value, w_out, lane, notes) * covered;
+                }
+            }
+            alpha += covered;
+            depth += sample.t * covered;
+            march.active &= alpha.simd_lt(S::f32s::splat(simd, 1.0 - OPAQUE));
+        }
+        let mut found = [Stretch::default(); MOST_LANES];
+        for lane in 0..S::WIDTH {
+            let transmittance = 1.0 - alpha.as_slice()[lane];
+            found[lane] = Stretch { radiance: radiance[lane], transmittance, depth: depth.as_slice()[lane] };
+        }
+        found
+    }
+
+    /// What a place sends along `w_out`, per unit extinction.
+    #[inline(always)]
+    fn source<S: Lanes>(
+        &self,
+        simd: S,
+        place: Vec3,
+        value: f32,
+        w_out: Vec3,
+        lane: usize,
+        notes: &mut impl MarchNotes<S>,
+    ) -> Rgb {
+        let medium = &*self.scene.medium;
+        let optics = medium.transfer().optics(value);
+        let Some(map) = self.map else { return optics.emitted() };
+        let event = medium.event(place, &optics);
+        let at = Gathering { place, opacity: optics.opacity, event, w_out, lane };
+        optics.emitted() + map.scattered(simd, medium, &at, notes)
+    }
+}
+
+/// Writes down what each lane's stretch reads.
+pub(super) struct Notes<'a> {
+    pub groups: &'a HistoryGroups,
+    pub bins: ValueBins,
+    /// Of each majorant cell the groups of values that it can yield.
+    pub cells: &'a [Historygram],
+    pub read: [Historygram; MOST_LANES],
+}
+
+impl<S: Lanes> MarchNotes<S> for Notes<'_> {
+    const EACH_CELL: bool = true;
+
+    #[inline(always)]
+    fn values(&mut self, simd: S, lanes: S::mask32s, values: S::f32s) {
+        let bin = self.bins.bin_lanes(simd, values);
+        let taken = lanes.select(S::i32s::splat(simd, 1), S::i32s::splat(simd, 0));
+        for lane in 0..S::WIDTH {
+            let group = self.groups.of_bins()[bin.as_slice()[lane].cast_unsigned() as usize];
+            let taken = u128::from(taken.as_slice()[lane].cast_unsigned());
+            self.read[lane] |= Historygram::from_bits(taken << group);
+        }
+    }
+
+    #[inline(always)]
+    fn values_about(&mut self, simd: S, lane: usize, read: S::mask32s, values: S::f32s) {
+        let bin = self.bins.bin_lanes(simd, values);
+        let read = read.select(S::i32s::splat(simd, 1), S::i32s::splat(simd, 0));
+        for (&bin, &read) in bin.as_slice().iter().zip(read.as_slice()) {
+            let group = self.groups.of_bins()[bin.cast_unsigned() as usize];
+            self.read[lane] |= Historygram::from_bits(u128::from(read.cast_unsigned()) << group);
+        }
+    }
+
+    #[inline(always)]
+    fn cells(&mut self, simd: S, lanes: S::mask32s, cells: S::u32s) {
+        if lanes.any_true() {
+            let taken = lanes.select(S::u32s::splat(simd, 1), S::u32s::splat(simd, 0));
+            for lane in 0..S::WIDTH {
+                if taken.as_slice()[lane] > 0 {
+                    self.read[lane] |= self.cells[cells.as_slice()[lane] as usize];
+                }
+            }
+        }
+    }
+}

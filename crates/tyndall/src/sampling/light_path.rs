@@ -1,0 +1,95 @@
+//! The numbers of one light path: each follows from seed, pass, light, path, bounce and dimension alone, so that a path that
+//! is traced again, from its beginning or from any scattering on, draws the same.
+
+use super::sampler::{BounceSample, SEQUENCE, SOBOL_BOUNCES};
+use super::{Stream, philox};
+use crate::math::cast;
+use sobol_burley::sample_4d;
+
+/// Owen-scrambled Sobol points \[Burley20\] over the paths of a light, and a [`Stream`] per flight.
+#[derive(Clone, Copy, Debug)]
+pub struct LightPathSampler {
+    seed: u64,
+    light: u32,
+    path: u32,
+    scramble: u32,
+}
+
+impl LightPathSampler {
+    /// The numbers of a light's `path`-th path in a pass; paths of other passes and lights draw independently.
+    #[must_use]
+    pub fn new(seed: u64, pass: u32, light: u32, path: u32) -> Self {
+        // The golden ratio spreads passes over all seeds; the first pass has the seed itself.
+        let seed = seed.wrapping_add(u64::from(pass).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+        let key = [cast::low_u32(seed), cast::low_u32(seed >> 32)];
+        let [scramble, ..] = philox([light, path / SEQUENCE, 0, 2], key);
+        Self { seed, light, path, scramble }
+    }
+
+    /// Paths among which the numbers of one dimension are spread evenly.
+    pub const STRATIFIED: u32 = SEQUENCE;
+
+    /// Where and whereto the path begins.
+    #[must_use]
+    pub fn emission(&self) -> [f32; 4] {
+        sample_4d(self.path % SEQUENCE, 0, self.scramble)
+    }
+
+    /// The numbers of the `bounce`-th flight and of the scattering at its end, counted from 0.
+    #[inline]
+    #[must_use]
+    pub fn bounce(&self, bounce: u32) -> BounceSample {
+        let [a, b] = if bounce < SOBOL_BOUNCES {
+            [1, 2].map(|k| sample_4d(self.path % SEQUENCE, k + 2 * bounce, self.scramble))
+        } else {
+            // A stream apart from the flight's, whose draws have no fixed number.
+            let mut stream = self.stream(bounce | 1 << 31);
+            [(); 2].map(|()| [(); 4].map(|()| stream.uniform()))
+        };
+        BounceSample {
+            flight: a[0],
+            light_choice: a[1],
+            light: [a[2], a[3]],
+            scatter: [b[0], b[1], b[2]],
+            roulette: b[3],
+        }
+    }
+
+    /// Numbers for the tracking of the `bounce`-th flight, whose count is not known beforehand.
+    #[inline]
+    #[must_use]
+    pub fn stream(&self, bounce: u32) -> Stream {
+        Stream::new(self.seed, [self.light, self.path, bounce])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_follow_from_the_address_alone() {
+        let of = |seed, pass, light, path| {
+            let numbers = LightPathSampler::new(seed, pass, light, path);
+            (numbers.emission(), numbers.bounce(3), numbers.bounce(40), numbers.stream(5).bits())
+        };
+        assert_eq!(of(1, 0, 2, 70_000), of(1, 0, 2, 70_000));
+        let others = [of(2, 0, 2, 70_000), of(1, 1, 2, 70_000), of(1, 0, 3, 70_000), of(1, 0, 2, 70_001)];
+        let here = of(1, 0, 2, 70_000);
+        for other in others {
+            assert!(here.0 != other.0 && here.1 != other.1 && here.2 != other.2 && here.3 != other.3);
+        }
+    }
+
+    #[test]
+    fn the_paths_of_a_light_are_stratified() {
+        let mut strata = [0; 256];
+        for path in 0..256 {
+            let [u, v, ..] = LightPathSampler::new(9, 0, 1, path).emission();
+            strata[cast::index(u * 16.0) * 16 + cast::index(v * 16.0)] += 1;
+        }
+        assert_eq!(strata, [1; 256]);
+        let late = (0..4096).map(|path| f64::from(LightPathSampler::new(9, 0, 1, path).bounce(100).flight));
+        assert!((late.sum::<f64>() / 4096.0 - 0.5).abs() < 4.0 * 0.289 / 64.0);
+    }
+}

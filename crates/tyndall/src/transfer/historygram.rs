@@ -1,0 +1,236 @@
+//! Historygrams \[Jonsson12, sec. 4.2\]: which data values a computation has read, as a set of groups of values.
+//!
+//! An edit of the transfer function is a set of values too; what has read none of them need not be computed again. Groups
+//! are made of whole [`ValueBins`], which the tables of optics are kept in, and follow from the data alone, so that no
+//! edit moves them.
+
+use super::BinSet;
+use crate::math::cast;
+use crate::volume::{ValueBins, Volume};
+use std::ops::{BitAnd, BitOr, BitOrAssign};
+
+/// A set of groups of data values; one bit each, at most 128.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Historygram(u128);
+
+impl Historygram {
+    /// Nothing.
+    pub const EMPTY: Self = Self(0);
+
+    /// Every group that there can be.
+    pub const ALL: Self = Self(u128::MAX);
+
+    /// Whether nothing is in it.
+    #[inline]
+    #[must_use]
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether both have a group in common \[Jonsson12, eq. 10\].
+    #[inline]
+    #[must_use]
+    pub fn meets(self, query: Self) -> bool {
+        self.0 & query.0 != 0
+    }
+
+    /// The bits, group 0 the lowest.
+    #[inline]
+    #[must_use]
+    pub fn bits(self) -> u128 {
+        self.0
+    }
+
+    /// From bits, group 0 the lowest.
+    #[inline]
+    #[must_use]
+    pub fn from_bits(bits: u128) -> Self {
+        Self(bits)
+    }
+}
+
+/// \[Jonsson12, eq. 9\]
+impl BitOr for Historygram {
+    type Output = Self;
+
+    #[inline]
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+impl BitOrAssign for Historygram {
+    #[inline]
+    fn bitor_assign(&mut self, other: Self) {
+        self.0 |= other.0;
+    }
+}
+
+impl BitAnd for Historygram {
+    type Output = Self;
+
+    #[inline]
+    fn bitand(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+}
+
+/// How data values are put into groups.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Grouping {
+    /// Groups that hold equally many voxels, as far as whole bins allow.
+    #[default]
+    Quantile,
+    /// Groups equally wide, as in \[Jonsson12, eq. 11\] but that the last is as wide as the others.
+    Uniform,
+}
+
+/// The groups of a volume's values: the mapping `delta` of \[Jonsson12\].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct HistoryGroups {
+    /// The group of each value bin.
+    groups: Vec<u8>,
+    count: u8,
+}
+
+impl HistoryGroups {
+    /// `count` groups, 1 to 128, of a volume's value bins.
+    ///
+    /// # Panics
+    /// If `count` is none of these.
+    #[must_use]
+    pub fn new(volume: &Volume, count: u8, grouping: Grouping) -> Self {
+        assert!((1..=128).contains(&count), "{count} groups: a Historygram has 1 to 128");
+        let groups = match grouping {
+            Grouping::Uniform => {
+                let share = f32::from(count) / ValueBins::COUNT as f32;
+                (0..ValueBins::COUNT).map(|bin| group(bin as f32 * share)).collect()
+            }
+            Grouping::Quantile => {
+                let bins = volume.value_bins();
+                let ends = [1.0, (ValueBins::COUNT - 1) as f32].map(|place| f64::from(bins.value(place)));
+                let inside = volume.histogram(ends, ValueBins::INSIDE).counts;
+                equal_counts(&inside, count)
+            }
+        };
+        Self { groups, count }
+    }
+
+    /// How many groups there are at most.
+    #[must_use]
+    pub fn count(&self) -> u8 {
+        self.count
+    }
+
+    /// The group of each value bin.
+    #[must_use]
+    pub fn of_bins(&self) -> &[u8] {
+        &self.groups
+    }
+
+    /// What reading values from `first` to `last` leaves in a history, both in bins.
+    #[must_use]
+    pub fn between(&self, first: usize, last: usize) -> Historygram {
+        // Groups ascend with the bins, so that all between the ends are met.
+        let [first, last] = [first, last].map(|bin| u32::from(self.groups[bin]));
+        Historygram(u128::MAX >> (127 - last) & u128::MAX << first)
+    }
+
+    /// The Historygram of changed bins, which histories are asked for \[Jonsson12, sec. 4.2\].
+    #[must_use]
+    pub fn query(&self, changed: &BinSet) -> Historygram {
+        changed.iter().fold(Historygram::EMPTY, |query, bin| query | self.between(bin, bin))
+    }
+}
+
+fn group(x: f32) -> u8 {
+    u8::try_from(cast::index(x)).expect("a group's number")
+}
+
+/// Cuts bins, given their counts without the two outer ones, into groups that hold equally many. What fills a group alone
+/// takes its share from it, and the rest is cut anew.
+fn equal_counts(inside: &[u64], count: u8) -> Vec<u8> {
+    let mut left: u64 = inside.iter().sum();
+    let (mut group, mut held) = (0_u8, 0_u64);
+    let mut groups = Vec::with_capacity(inside.len() + 2);
+    groups.push(0);
+    for &n in inside {
+        let groups_left = u64::from(count - group);
+        let wanted = left.div_ceil(groups_left);
+        // A new group where this one is full, or would overflow by more than it lacks.
+        let full = held > 0 && n > 0 && held + n / 2 >= wanted;
+        if full && groups_left > 1 {
+            group += 1;
+            left -= held;
+            held = 0;
+        }
+        held += n;
+        groups.push(group);
+    }
+    groups.push(group);
+    groups
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::{Grid, ValueMap, Voxels};
+
+    fn volume(values: Vec<u8>) -> Volume {
+        let grid = Grid::centred([values.len(), 1, 1], [1.0; 3]).unwrap();
+        Volume::new(grid, Voxels::U8(values), ValueMap::IDENTITY).unwrap()
+    }
+
+    fn sizes(groups: &[u8], counts: &[u64]) -> Vec<u64> {
+        let mut sizes = vec![0; 256];
+        groups[1..].iter().zip(counts).for_each(|(&g, n)| sizes[usize::from(g)] += n);
+        sizes
+    }
+
+    #[test]
+    fn groups_hold_equally_many() {
+        let counts: Vec<u64> = (0..1024).map(|i| 10 + i % 7).collect();
+        let groups = equal_counts(&counts, 64);
+        assert!(groups.is_sorted() && groups.len() == ValueBins::COUNT && groups[1025] == 63);
+        for size in &sizes(&groups, &counts)[..64] {
+            assert!((150..270).contains(size), "{size}");
+        }
+    }
+
+    #[test]
+    fn a_value_that_most_voxels_have_does_not_ruin_the_others() {
+        let mut counts = vec![1; 1024];
+        counts[3] = 1_000_000;
+        let groups = equal_counts(&counts, 32);
+        assert!(groups[1025] >= 30, "{}", groups[1025]);
+        // Fewer values than groups: each has its own.
+        let mut few = vec![0; 1024];
+        for bin in [5, 300, 301, 900] {
+            few[bin] = 77;
+        }
+        let groups = equal_counts(&few, 64);
+        let of: Vec<_> = [5, 300, 301, 900].map(|bin| groups[bin + 1]).to_vec();
+        assert_eq!(of, [0, 1, 2, 3]);
+    }
+
+    #[test]
+    fn ranges_and_queries_name_the_groups_that_they_touch() {
+        let volume = volume((0..=255).collect());
+        for (count, grouping) in
+            [(32, Grouping::Uniform), (64, Grouping::Quantile), (128, Grouping::Quantile)]
+        {
+            let groups = HistoryGroups::new(&volume, count, grouping);
+            let used = groups.of_bins().iter().max().copied();
+            assert_eq!(used, Some(count - 1), "{grouping:?}");
+            let mut changed = BinSet::EMPTY;
+            (300..=500).for_each(|bin| changed.insert(bin));
+            assert_eq!(groups.query(&changed), groups.between(300, 500));
+            for bin in 0..ValueBins::COUNT {
+                let one = groups.between(bin, bin);
+                assert_eq!(one.bits().count_ones(), 1);
+                assert!(!changed.contains(bin) || one.meets(groups.query(&changed)));
+            }
+            assert!(!groups.between(0, 200).meets(groups.between(900, 1025)));
+        }
+    }
+}
