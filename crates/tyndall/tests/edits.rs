@@ -191,6 +191,9 @@ fn after_any_edits_photons_and_segments_are_those_from_nothing() {
             "history_bits": ([32, 64, 128][round % 3]),
             "bins": (["quantile", "uniform"][round / 3 % 2]),
             "spatial": (["cells", "axes"][round / 6 % 2]),
+            "estimate": (["point", "nearest", "beam"][round / 2 % 3]),
+            "nearest": 5,
+            "histories": (["interactions", "paths"][round / 5 % 2]),
         });
         let mut live = Session::new(scene(&value), THREADS.clone());
         refined(&mut live, 1);

@@ -42,6 +42,8 @@ impl Steps {
 pub(crate) struct PacketSample<S: Lanes> {
     /// World distance along each track.
     pub t: S::f32s,
+    /// Width of the step, world units.
+    pub width: S::f32s,
     /// In index space.
     pub place: [S::f32s; 3],
     /// Data value.
@@ -239,7 +241,7 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
             let opacity = self.medium.transfer.opacity_lanes(simd, value);
             let thickness = here.select(opacity * width * self.medium.density, zero);
             if thickness.simd_gt(zero).any_true() {
-                return Some(PacketSample { t, place, value, thickness });
+                return Some(PacketSample { t, width, place, value, thickness });
             }
         }
         None

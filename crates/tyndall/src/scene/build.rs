@@ -1,7 +1,9 @@
 //! From the checked document to the scene: what was left to choice is chosen here, by the volume.
 
 use super::document::{self, Document};
-use super::{Background, IntegratorKind, PhotonSettings, RenderSettings, Scene, SpatialHistory};
+use super::{
+    Background, Estimate, Histories, IntegratorKind, PhotonSettings, RenderSettings, Scene, SpatialHistory,
+};
 use crate::camera::{AutoView, Camera, FitLens, Lens, fit};
 use crate::light::{Directional, Disk, Environment, Light, LightSet, Map, PointLight, Rect, SphereLight};
 use crate::math::{Bounds, Frame, Rgb, Vec3, cast};
@@ -277,6 +279,15 @@ fn photon_settings(settings: &document::PhotonSettings) -> PhotonSettings {
         radius: settings.radius,
         segments: settings.segments,
         steps_per_voxel: settings.steps_per_voxel,
+        estimate: match settings.estimate {
+            document::Estimate::Point => Estimate::Point,
+            document::Estimate::Nearest => Estimate::Nearest(settings.nearest),
+            document::Estimate::Beam => Estimate::Beam,
+        },
+        histories: match settings.histories {
+            document::Histories::Interactions => Histories::Interactions,
+            document::Histories::Paths => Histories::Paths,
+        },
         history_bits: u8::try_from(settings.history_bits).unwrap_or(128),
         bins: match settings.bins {
             document::HistoryBins::Quantile => Grouping::Quantile,

@@ -82,12 +82,38 @@ pub struct PhotonSettings {
     pub segments: u32,
     /// Steps of a view ray in each voxel; positive.
     pub steps_per_voxel: f32,
+    /// How light is estimated from photons.
+    pub estimate: Estimate,
+    /// Which part of a path has a history of its own.
+    pub histories: Histories,
     /// Groups of values in a Historygram, 1 to 128.
     pub history_bits: u8,
     /// How values are put into groups.
     pub bins: Grouping,
     /// How segments learn which photons changed.
     pub spatial: SpatialHistory,
+}
+
+/// How light is estimated from photons.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimate {
+    /// By all photons within the radius.
+    #[default]
+    Point,
+    /// By so many nearest ones, within the radius at most.
+    Nearest(u32),
+    /// By all photons within the radius of the ray \[Jarosz08\].
+    Beam,
+}
+
+/// Which part of a path has a history of its own \[Jonsson12, sec. 6.2.1\].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Histories {
+    /// Each interaction: an edit retraces paths from where it touched them.
+    #[default]
+    Interactions,
+    /// The whole path: less memory, and paths are retraced from their beginning.
+    Paths,
 }
 
 /// How segments learn which photons changed.
@@ -124,6 +150,13 @@ impl Scene {
         if marching && self.medium.transfer().emits() {
             notes.push(
                 "`raymarch` leaves out the light that glowing matter sends to other matter; `path` has it",
+            );
+        }
+        if let IntegratorKind::Photon(PhotonSettings { spatial: SpatialHistory::Off, .. }) =
+            self.render.integrator
+        {
+            notes.push(
+                "with `spatial = \"off\"` edits leave light where it was: the picture is not the one from nothing",
             );
         }
         if bends {

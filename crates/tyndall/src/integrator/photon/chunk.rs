@@ -6,6 +6,7 @@ use super::paths::{Interactions, Past, Photon, Tracer};
 use super::spatial::Changed;
 use crate::math::cast;
 use crate::sampling::LightPathSampler;
+use crate::scene;
 use crate::simd::{Kernel, Lanes};
 use std::ops::Range;
 
@@ -30,12 +31,12 @@ pub(super) struct Chunk {
 
 impl Chunk {
     /// Paths yet to be traced.
-    pub fn new(paths: Vec<u32>, groups: u8) -> Self {
+    pub fn new(paths: Vec<u32>, groups: u8, histories: scene::Histories) -> Self {
         Self {
             ends: Vec::new(),
             flight: Histories::with_len(groups, paths.len()),
             scatter: Histories::with_len(groups, paths.len()),
-            interactions: Interactions::new(groups),
+            interactions: Interactions::new(groups, histories == scene::Histories::Interactions),
             changed: Past::NOTHING,
             traced: false,
             paths,
@@ -81,7 +82,8 @@ impl Chunk {
     /// \[Jonsson12, sec. 4.3.1\].
     fn valid(&self, path: usize) -> Range<usize> {
         let whole = self.range(path);
-        let valid = whole.clone().rev().find(|&i| !self.interactions.past(i).meets(&self.changed));
+        let is_valid = |past: Past| !past.meets(&self.changed);
+        let valid = whole.clone().rev().find(|&i| self.interactions.past(i).is_some_and(is_valid));
         whole.start..valid.map_or(whole.start, |i| i + 1)
     }
 }
@@ -105,7 +107,7 @@ impl Kernel for Update<'_> {
         let touched = |chunk: &Chunk, path: usize| !chunk.traced || chunk.past(path).meets(&chunk.changed);
         let mut retraced = 0;
         if (0..chunk.len()).any(|path| touched(chunk, path)) {
-            let mut found = Interactions::new(tracer.groups.count());
+            let mut found = Interactions::like(&chunk.interactions, tracer.groups.count());
             let mut ends = Vec::with_capacity(chunk.len());
             for path in 0..chunk.len() {
                 if touched(chunk, path) {
@@ -114,7 +116,7 @@ impl Kernel for Update<'_> {
                     found.extend(&chunk.interactions, kept.clone());
                     let first = found.photons.len();
                     let last = kept.clone().last();
-                    let from = last.map(|i| (chunk.photons()[i], chunk.interactions.past(i)));
+                    let from = last.and_then(|i| Some((chunk.photons()[i], chunk.interactions.past(i)?)));
                     let numbers = numbers(chunk.paths[path]);
                     let past = tracer.trace(&numbers, from.as_ref().map(|(p, past)| (p, *past)), &mut found);
                     chunk.flight.set(path, past.flight);

@@ -1,6 +1,6 @@
 //! What of light paths, photons and segments an edit leaves valid.
 
-use super::lights::{LightPaths, share, sources};
+use super::lights::{LightPaths, Plan, sources};
 use super::paths::Past;
 use super::{PhotonMapping, SegmentTile};
 use crate::light::Light;
@@ -102,8 +102,7 @@ impl PhotonMapping {
     /// Keeps the paths of lights that send the same ones, wherever they are now among the lights.
     fn update_lights(&mut self, scene: &Scene, glow: bool) {
         let sources = sources(scene);
-        let count = share(self.settings.photons, sources.len());
-        let groups = self.ground.groups.count();
+        let plan = Plan::new(scene, &self.settings, 0, sources.len());
         let mut old: Vec<Option<LightPaths>> = self.lights.drain(..).map(Some).collect();
         for (light, stream) in sources {
             let kept = old.iter_mut().find(|old| old.as_ref().is_some_and(|old| old.stream == stream));
@@ -129,14 +128,14 @@ impl PhotonMapping {
                 }
                 None => {
                     self.map = None;
-                    LightPaths::new((light, stream), count, scene.render.seed, 0, groups)
+                    LightPaths::new((light, stream), &plan)
                 }
             };
-            if paths.count != count {
+            if paths.count != plan.count {
                 // Every photon of it now stands for more light, or for less.
                 self.mark(&paths);
                 self.map = None;
-                paths.set_count(count, scene.render.seed, groups);
+                paths.set_count(&plan);
             }
             self.lights.push(paths);
         }

@@ -24,8 +24,8 @@ pub(super) struct CellGrid {
     dims: [usize; 3],
     radius: f32,
     index_reach: Vec3,
-    /// Index space to a sphere of the radius: where points of the unit ball lie about a place.
-    ball: Mat3,
+    /// Metric vectors to index space.
+    to_index: Mat3,
 }
 
 impl CellGrid {
@@ -43,12 +43,12 @@ impl CellGrid {
         }
         let dims = cells(edge).to_array().map(cast::index);
         // A sphere reaches as far along an axis as that axis's row of the inverse is long.
-        let rows = linear.inverse().transpose();
+        let to_index = linear.inverse();
+        let rows = to_index.transpose();
         let lengths = Vec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
         let index_reach = lengths * (radius * (1.0 + MARGIN)) + MARGIN;
-        let ball = linear.inverse() * Mat3::from_diagonal(Vec3::splat(radius));
         Self {
-            ball,
+            to_index,
             middle,
             linear,
             origin: around.min,
@@ -65,9 +65,10 @@ impl CellGrid {
         self.radius
     }
 
-    /// A point of the unit ball, to where in index space it lies about a place.
-    pub fn in_ball(&self, p: Vec3) -> Vec3 {
-        self.ball * p
+    /// Takes metric vectors to index space.
+    #[inline(always)]
+    pub fn index_per_metric(&self) -> &Mat3 {
+        &self.to_index
     }
 
     /// How far the radius reaches along each axis of index space.
@@ -113,14 +114,14 @@ impl CellGrid {
         })
     }
 
-    /// The cells that may hold something within the radius of a metric place: first and last along each axis.
+    /// The cells that may hold something within reach of a metric place: first and last along each axis.
     #[inline(always)]
-    pub fn around(&self, p: Vec3) -> [[usize; 2]; 3] {
-        let r = self.radius;
+    pub fn around(&self, p: Vec3, reach: Vec3) -> [[usize; 2]; 3] {
+        let (lo, hi) = (p - reach, p + reach);
         [
-            [self.along(p.x - r, 0), self.along(p.x + r, 0)],
-            [self.along(p.y - r, 1), self.along(p.y + r, 1)],
-            [self.along(p.z - r, 2), self.along(p.z + r, 2)],
+            [self.along(lo.x, 0), self.along(hi.x, 0)],
+            [self.along(lo.y, 1), self.along(hi.y, 1)],
+            [self.along(lo.z, 2), self.along(hi.z, 2)],
         ]
     }
 
@@ -177,7 +178,7 @@ mod tests {
             near += 1;
             let number = cells.number(cells.cell(q));
             assert!(cells.neighbours(cells.cell(p)).any(|i| i == number));
-            let around = cells.around(p);
+            let around = cells.around(p, Vec3::splat(cells.radius()));
             let at = cells.cell(q);
             assert!((0..3).all(|a| (around[a][0]..=around[a][1]).contains(&at[a])), "{p} {q}");
             let (bins, reach) = (cells.axis_bins(q), cells.axis_reach(p));

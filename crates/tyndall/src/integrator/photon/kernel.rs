@@ -1,116 +1,164 @@
-//! What photons within a radius have met there: the mean opacity of a small sphere.
+//! Over which part of space a gather takes photons together.
 
-use super::grid::CellGrid;
-use crate::math::{Mat3, Vec3};
-use crate::medium::{MOST_LANES, MarchNotes, Medium};
+use crate::math::{Frame, Vec3};
+use crate::medium::MOST_LANES;
 use crate::simd::Lanes;
 use fearless_simd::prelude::*;
 use std::f32::consts::PI;
 
-/// Share of the flux that the slope may take away at most: at a flat skin it takes 0.7.
-const MOST_LEAN: f32 = 0.75;
+/// A part of metric space about a place.
+pub(super) trait Kernel: Copy {
+    /// How far it reaches along each axis.
+    fn reach(&self) -> Vec3;
 
-/// Points of a sphere, opposite ones in pairs, spread evenly through it: the mean over them and the middle is exact where
-/// opacity is linear.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Kernel {
-    /// About the middle, in index space.
-    x: [f32; MOST_LANES],
-    y: [f32; MOST_LANES],
-    z: [f32; MOST_LANES],
-    /// The same in metric space, in radii.
-    u: [f32; MOST_LANES],
-    v: [f32; MOST_LANES],
-    w: [f32; MOST_LANES],
+    /// World units cubed.
+    fn volume(&self) -> f32;
+
+    /// Whether it holds what lies so far from the place.
+    fn holds<S: Lanes>(&self, simd: S, apart: [S::f32s; 3]) -> S::mask32s;
+
+    /// Points spread evenly through it, opposite ones in pairs, from a number on: relative to the place.
+    fn points<S: Lanes>(&self, simd: S, first: usize) -> [S::f32s; 3];
 }
 
-impl Kernel {
-    pub fn new(grid: &CellGrid) -> Self {
-        let zero = [0.0; MOST_LANES];
-        let mut kernel = Self { x: zero, y: zero, z: zero, u: zero, v: zero, w: zero };
+/// All within a radius: the point estimate \[Jensen98\].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ball<'a> {
+    pub radius: f32,
+    pub points: &'a Points,
+}
+
+impl Kernel for Ball<'_> {
+    fn reach(&self) -> Vec3 {
+        Vec3::splat(self.radius)
+    }
+
+    fn volume(&self) -> f32 {
+        4.0 / 3.0 * PI * self.radius.powi(3)
+    }
+
+    #[inline(always)]
+    fn holds<S: Lanes>(&self, simd: S, [x, y, z]: [S::f32s; 3]) -> S::mask32s {
+        (x * x + y * y + z * z).simd_lt(S::f32s::splat(simd, self.radius * self.radius))
+    }
+
+    #[inline(always)]
+    fn points<S: Lanes>(&self, simd: S, first: usize) -> [S::f32s; 3] {
+        let Points { ball: [x, y, z], .. } = self.points;
+        let range = first..first + S::WIDTH;
+        [
+            S::f32s::from_slice(simd, &x[range.clone()]) * self.radius,
+            S::f32s::from_slice(simd, &y[range.clone()]) * self.radius,
+            S::f32s::from_slice(simd, &z[range]) * self.radius,
+        ]
+    }
+}
+
+/// All that a step of a ray passes within a radius: the beam radiance estimate \[Jarosz08\], step by step. Together the steps
+/// make one beam, along which nothing is blurred.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slice<'a> {
+    pub radius: f32,
+    /// World units along the ray.
+    pub width: f32,
+    /// About the ray's direction.
+    pub frame: Frame,
+    pub points: &'a Points,
+}
+
+impl Kernel for Slice<'_> {
+    fn reach(&self) -> Vec3 {
+        let along = self.frame.w.abs();
+        (Vec3::ONE - along * along).max(Vec3::ZERO).map(f32::sqrt) * self.radius + along * (0.5 * self.width)
+    }
+
+    fn volume(&self) -> f32 {
+        PI * self.radius * self.radius * self.width
+    }
+
+    #[inline(always)]
+    fn holds<S: Lanes>(&self, simd: S, [x, y, z]: [S::f32s; 3]) -> S::mask32s {
+        let d = self.frame.w;
+        let along = x * d.x + y * d.y + z * d.z;
+        let aside = x * x + y * y + z * z - along * along;
+        // Half open, so that no photon counts in two steps.
+        let half = 0.5 * self.width;
+        aside.simd_lt(S::f32s::splat(simd, self.radius * self.radius))
+            & along.simd_ge(S::f32s::splat(simd, -half))
+            & along.simd_lt(S::f32s::splat(simd, half))
+    }
+
+    #[inline(always)]
+    fn points<S: Lanes>(&self, simd: S, first: usize) -> [S::f32s; 3] {
+        let Points { disk: [a, b], .. } = self.points;
+        let a = S::f32s::from_slice(simd, &a[first..first + S::WIDTH]) * self.radius;
+        let b = S::f32s::from_slice(simd, &b[first..first + S::WIDTH]) * self.radius;
+        let Frame { u, v, .. } = self.frame;
+        [a * u.x + b * v.x, a * u.y + b * v.y, a * u.z + b * v.z]
+    }
+}
+
+/// Points of the unit ball and of the unit disk.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Points {
+    ball: [[f32; MOST_LANES]; 3],
+    disk: [[f32; MOST_LANES]; 2],
+}
+
+impl Points {
+    pub fn new() -> Self {
+        let mut points = Self { ball: [[0.0; MOST_LANES]; 3], disk: [[0.0; MOST_LANES]; 2] };
         let pairs = MOST_LANES / 2;
         for pair in 0..pairs {
-            let share = (pair as f32 + 0.5) / pairs as f32;
-            // Equal volumes, and a golden-angle spiral down one half; neighbours on it are at unlike radii.
-            let radius = ((pair * 3 % pairs) as f32 + 0.5).cbrt() / (pairs as f32).cbrt();
+            let share = |i: usize| (i as f32 + 0.5) / pairs as f32;
+            // Golden-angle spirals over one half, at radii that halve all volumes alike; neighbours at unlike ones.
             let (sin, cos) = (pair as f32 * PI * (3.0 - 5.0_f32.sqrt())).sin_cos();
-            let across = (1.0 - share * share).sqrt();
-            let q = Vec3::new(across * cos, across * sin, share) * radius;
-            for (lane, q) in [(2 * pair, q), (2 * pair + 1, -q)] {
-                let p = grid.in_ball(q);
-                (kernel.u[lane], kernel.v[lane], kernel.w[lane]) = (q.x, q.y, q.z);
-                (kernel.x[lane], kernel.y[lane], kernel.z[lane]) = (p.x, p.y, p.z);
+            let (height, within) = (share(pair), share(pair * 3 % pairs));
+            let across = (1.0 - height * height).sqrt();
+            let in_ball = Vec3::new(across * cos, across * sin, height) * within.cbrt();
+            let (sin, cos) = (PI * share(pair)).sin_cos();
+            let in_disk = [cos, sin].map(|x| x * within.sqrt());
+            for (point, sign) in [(2 * pair, 1.0), (2 * pair + 1, -1.0)] {
+                for (axis, x) in points.ball.iter_mut().zip(in_ball.to_array()) {
+                    axis[point] = sign * x;
+                }
+                for (axis, x) in points.disk.iter_mut().zip(in_disk) {
+                    axis[point] = sign * x;
+                }
             }
         }
-        kernel
+        points
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Mean products of the coordinates of points.
+    fn moments<const N: usize>(points: &[[f32; MOST_LANES]; N]) -> [[f32; N]; N] {
+        let mean = |a: usize, b: usize| (0..MOST_LANES).map(|i| points[a][i] * points[b][i]).sum::<f32>();
+        std::array::from_fn(|a| std::array::from_fn(|b| mean(a, b) / MOST_LANES as f32))
     }
 
-    /// The matter about a place of index space, whose own opacity is given.
-    #[inline(always)]
-    pub fn matter<S: Lanes>(
-        &self,
-        simd: S,
-        medium: &Medium,
-        place: Vec3,
-        own: f32,
-        lane: usize,
-        notes: &mut impl MarchNotes<S>,
-    ) -> Matter {
-        let zero = S::f32s::splat(simd, 0.0);
-        let mut sum = S::f32s::splat(simd, 0.0);
-        let (mut sx, mut sy, mut sz) = (zero, zero, zero);
-        let (mut xx, mut yy, mut zz) = (zero, zero, zero);
-        let (mut xy, mut xz, mut yz) = (zero, zero, zero);
-        let mut first = 0;
-        while first < MOST_LANES {
-            let x = S::f32s::from_slice(simd, &self.x[first..first + S::WIDTH]);
-            let y = S::f32s::from_slice(simd, &self.y[first..first + S::WIDTH]);
-            let z = S::f32s::from_slice(simd, &self.z[first..first + S::WIDTH]);
-            let about = [x + place.x, y + place.y, z + place.z];
-            let inside = medium.contains_lanes(simd, about);
-            let value = medium.volume().value_lanes(simd, about);
-            notes.values_about(simd, lane, inside, value);
-            let opacity = medium.transfer().opacity_lanes(simd, value);
-            let opacity = inside.select(opacity, zero);
-            let x = S::f32s::from_slice(simd, &self.u[first..first + S::WIDTH]);
-            let y = S::f32s::from_slice(simd, &self.v[first..first + S::WIDTH]);
-            let z = S::f32s::from_slice(simd, &self.w[first..first + S::WIDTH]);
-            sum += opacity;
-            let (ox, oy, oz) = (opacity * x, opacity * y, opacity * z);
-            sx += ox;
-            sy += oy;
-            sz += oz;
-            xx = ox.mul_add(x, xx);
-            yy = oy.mul_add(y, yy);
-            zz = oz.mul_add(z, zz);
-            xy = ox.mul_add(y, xy);
-            xz = ox.mul_add(z, xz);
-            yz = oy.mul_add(z, yz);
-            first += S::WIDTH;
+    #[test]
+    fn points_stand_for_ball_and_disk() {
+        let points = Points::new();
+        for axis in points.ball.iter().chain(&points.disk) {
+            assert!(axis.iter().sum::<f32>().abs() < 1e-6);
         }
-        let n = (MOST_LANES + 1) as f32;
-        let mean = (total(sum.as_slice()) + own) / n;
-        let lean = Vec3::new(total(sx.as_slice()), total(sy.as_slice()), total(sz.as_slice())) / n;
-        let (xx, yy, zz) = (total(xx.as_slice()) / n, total(yy.as_slice()) / n, total(zz.as_slice()) / n);
-        let (xy, xz, yz) = (total(xy.as_slice()) / n, total(xz.as_slice()) / n, total(yz.as_slice()) / n);
-        let e = 0.02 * mean;
-        let spread =
-            Mat3::from_cols(Vec3::new(xx + e, xy, xz), Vec3::new(xy, yy + e, yz), Vec3::new(xz, yz, zz + e));
-        let slope = spread.inverse() * lean;
-        let slope = slope * (MOST_LEAN * mean / slope.dot(lean).max(MOST_LEAN * mean));
-        Matter { opacity: mean - slope.dot(lean), slope }
+        // Of the whole ball 1/5 and of the whole disk 1/4 along each axis, nothing across.
+        for (a, row) in moments(&points.ball).iter().enumerate() {
+            for (b, &found) in row.iter().enumerate() {
+                let expected = if a == b { 0.2 } else { 0.0 };
+                assert!((found - expected).abs() < 0.04, "ball {a} {b}: {found}");
+            }
+        }
+        for (a, row) in moments(&points.disk).iter().enumerate() {
+            for (b, &found) in row.iter().enumerate() {
+                let expected = if a == b { 0.25 } else { 0.0 };
+                assert!((found - expected).abs() < 0.04, "disk {a} {b}: {found}");
+            }
+        }
     }
-}
-
-/// Moments of the opacity about a place.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Matter {
-    pub opacity: f32,
-    /// Per radius.
-    pub slope: Vec3,
-}
-
-#[inline(always)]
-fn total(lanes: &[f32]) -> f32 {
-    lanes.iter().sum()
 }

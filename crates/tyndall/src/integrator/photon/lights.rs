@@ -7,7 +7,7 @@ use crate::integrator::Stop;
 use crate::light::{Enclosure, Light};
 use crate::math::{Rgb, cast};
 use crate::sampling::LightPathSampler;
-use crate::scene::Scene;
+use crate::scene::{Histories, PhotonSettings, Scene};
 use crate::simd::Level;
 use crate::transfer::{HistoryGroups, Historygram};
 use rayon::prelude::*;
@@ -35,6 +35,29 @@ pub(super) struct Ground {
     pub cells: Vec<Historygram>,
     pub enclosure: Enclosure,
     pub level: Level,
+}
+
+/// What paths to make for each light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plan {
+    pub count: u32,
+    pub seed: u64,
+    pub pass: u32,
+    pub groups: u8,
+    pub histories: Histories,
+}
+
+impl Plan {
+    /// For so many sources: each has as many paths as the others.
+    pub fn new(scene: &Scene, settings: &PhotonSettings, pass: u32, sources: usize) -> Self {
+        Self {
+            count: (settings.photons / cast::fit_u32(sources.max(1))).max(1),
+            seed: scene.render.seed,
+            pass,
+            groups: settings.history_bits,
+            histories: settings.histories,
+        }
+    }
 }
 
 /// The stream of glowing matter's random numbers.
@@ -65,14 +88,10 @@ pub(super) fn sources(scene: &Scene) -> Vec<(Option<Light>, u32)> {
     sources
 }
 
-/// Of all paths those of each source.
-pub(super) fn share(photons: u32, sources: usize) -> u32 {
-    (photons / cast::fit_u32(sources.max(1))).max(1)
-}
-
 impl LightPaths {
     /// Paths yet to be traced. In each block of paths that are stratified together, those that start alike come together.
-    pub fn new((light, stream): (Option<Light>, u32), count: u32, seed: u64, pass: u32, groups: u8) -> Self {
+    pub fn new((light, stream): (Option<Light>, u32), plan: &Plan) -> Self {
+        let Plan { count, seed, pass, groups, histories } = *plan;
         const BLOCK: u32 = LightPathSampler::STRATIFIED;
         let of_block = |block: u32| {
             let key = |path: u32| morton(LightPathSampler::new(seed, pass, stream, path).emission());
@@ -80,7 +99,8 @@ impl LightPaths {
             let mut keys: Vec<(u32, u32)> = (block * BLOCK..last).map(|path| (key(path), path)).collect();
             keys.sort_unstable();
             let chunks = keys.chunks(chunk::PATHS);
-            let chunks = chunks.map(|keys| Chunk::new(keys.iter().map(|key| key.1).collect(), groups));
+            let chunks =
+                chunks.map(|keys| Chunk::new(keys.iter().map(|key| key.1).collect(), groups, histories));
             chunks.collect::<Vec<_>>()
         };
         let chunks = (0..count.div_ceil(BLOCK)).into_par_iter().flat_map_iter(of_block).collect();
@@ -88,9 +108,9 @@ impl LightPaths {
     }
 
     /// Changes how many paths there are; whole blocks that are in both stay as they are.
-    pub fn set_count(&mut self, count: u32, seed: u64, groups: u8) {
-        let other = Self::new((self.light.take(), self.stream), count, seed, 0, groups);
-        let whole = (self.count.min(count) / LightPathSampler::STRATIFIED) as usize;
+    pub fn set_count(&mut self, plan: &Plan) {
+        let other = Self::new((self.light.take(), self.stream), plan);
+        let whole = (self.count.min(plan.count) / LightPathSampler::STRATIFIED) as usize;
         let chunks = whole * (LightPathSampler::STRATIFIED as usize).div_ceil(chunk::PATHS);
         let old = std::mem::replace(self, other);
         self.chunks.iter_mut().zip(old.chunks).take(chunks).for_each(|(new, old)| *new = old);

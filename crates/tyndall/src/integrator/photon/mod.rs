@@ -11,11 +11,13 @@
 
 mod chunk;
 mod edit;
+mod gather;
 mod grid;
 mod histories;
 mod kernel;
 mod lights;
 mod map;
+mod matter;
 mod pass;
 mod paths;
 mod segments;
@@ -31,7 +33,7 @@ use crate::scene::{PhotonSettings, Scene, SpatialHistory};
 use crate::simd::Level;
 use crate::transfer::HistoryGroups;
 use grid::CellGrid;
-use lights::{Ground, LightPaths, share, sources, trace};
+use lights::{Ground, LightPaths, Plan, sources, trace};
 use map::{Lit, PhotonMap};
 use pass::Pass;
 use segments::Refine;
@@ -68,7 +70,9 @@ impl PhotonMapping {
         let cell_values = volume.cells_of(medium.majorants().voxels());
         let of_cell = |&[lo, hi]: &[f32; 2]| groups.between(bins.bin(lo), bins.bin(hi));
         let cells = cell_values.ranges().iter().map(of_cell).collect();
-        let grid = CellGrid::new(volume.grid(), settings.radius * volume.grid().voxel_size());
+        // A step is asked for at its middle, and reaches photons from all of its width.
+        let reach = settings.radius + 0.5 / settings.steps_per_voxel;
+        let grid = CellGrid::new(volume.grid(), reach * volume.grid().voxel_size());
         // When so many photons have changed, few segments are left that gather none of them.
         let enough = settings.photons as usize / 2;
         let places = match settings.spatial {
@@ -77,9 +81,8 @@ impl PhotonMapping {
             SpatialHistory::Cells => Changed::cells(grid, cell_values, enough),
         };
         let sources = sources(scene);
-        let count = share(settings.photons, sources.len());
-        let paths = |source| LightPaths::new(source, count, scene.render.seed, 0, groups.count());
-        let lights = sources.into_iter().map(paths).collect();
+        let plan = Plan::new(scene, &settings, 0, sources.len());
+        let lights = sources.into_iter().map(|source| LightPaths::new(source, &plan)).collect();
         Self {
             settings,
             ground: Ground { groups, cells, enclosure: Enclosure::new(volume.grid()), level },
@@ -105,7 +108,7 @@ impl PhotonMapping {
         }
         if sample > 0 {
             if self.pass.as_ref().is_none_or(|pass| pass.number != sample) {
-                self.pass = Some(Pass::new(scene, &self.settings, sample, self.ground.groups.count()));
+                self.pass = Some(Pass::new(scene, &self.settings, sample));
             }
             return self.pass.as_mut().is_some_and(|pass| pass.prepare(scene, &self.ground, stop));
         }
@@ -120,7 +123,7 @@ impl PhotonMapping {
             return false;
         }
         if self.map.is_none() {
-            self.map = Some(sorted(scene, self.settings.radius, &self.lights));
+            self.map = Some(sorted(scene, self.settings.radius, &self.settings, &self.lights));
         }
         self.has_segments = true;
         true
@@ -185,10 +188,10 @@ impl PhotonMapping {
 }
 
 /// Sorts the photons of all lights; `radius` in voxels.
-fn sorted(scene: &Scene, radius: f32, lights: &[LightPaths]) -> PhotonMap {
+fn sorted(scene: &Scene, radius: f32, settings: &PhotonSettings, lights: &[LightPaths]) -> PhotonMap {
     let grid = scene.medium.volume().grid();
     let cells = CellGrid::new(grid, radius * grid.voxel_size());
     let lit: Vec<Lit> =
         lights.iter().map(|light| Lit { chunks: &light.chunks, scale: light.scale() }).collect();
-    PhotonMap::new(cells, &lit)
+    PhotonMap::new(cells, settings.estimate, &lit)
 }

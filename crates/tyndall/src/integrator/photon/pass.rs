@@ -1,6 +1,6 @@
 //! Refinement passes: photons and rays of their own, which make the picture converge \[Knaus11\].
 
-use super::lights::{Ground, LightPaths, share, sources, trace};
+use super::lights::{Ground, LightPaths, Plan, sources, trace};
 use super::map::PhotonMap;
 use super::sorted;
 use super::spatial::Changed;
@@ -8,7 +8,7 @@ use super::view::{Stretches, View};
 use crate::film::{PixelSample, Tile};
 use crate::integrator::Stop;
 use crate::sampling::Stream;
-use crate::scene::{PhotonSettings, Scene};
+use crate::scene::{Histories, PhotonSettings, Scene};
 use crate::simd::{Kernel, Lanes};
 use std::sync::atomic::AtomicUsize;
 
@@ -16,6 +16,7 @@ use std::sync::atomic::AtomicUsize;
 #[derive(Debug)]
 pub(super) struct Pass {
     pub number: u32,
+    settings: PhotonSettings,
     /// Voxels.
     radius: f32,
     lights: Vec<LightPaths>,
@@ -32,12 +33,12 @@ fn shrunk(pass: u32) -> f32 {
 }
 
 impl Pass {
-    pub fn new(scene: &Scene, settings: &PhotonSettings, number: u32, groups: u8) -> Self {
+    pub fn new(scene: &Scene, settings: &PhotonSettings, number: u32) -> Self {
         let sources = sources(scene);
-        let count = share(settings.photons, sources.len());
-        let paths = |source| LightPaths::new(source, count, scene.render.seed, number, groups);
-        let lights = sources.into_iter().map(paths).collect();
-        Self { number, radius: settings.radius * shrunk(number), lights, map: None }
+        // Nothing of a pass lives through an edit.
+        let plan = Plan { histories: Histories::Paths, ..Plan::new(scene, settings, number, sources.len()) };
+        let lights = sources.into_iter().map(|source| LightPaths::new(source, &plan)).collect();
+        Self { number, settings: *settings, radius: settings.radius * shrunk(number), lights, map: None }
     }
 
     /// Traces and sorts the photons; false where a stop came first.
@@ -53,7 +54,7 @@ impl Pass {
         let traced = AtomicUsize::new(0);
         let whole = trace(&mut self.lights, scene, ground, self.number, &Changed::off(), &traced, stop);
         if whole {
-            self.map = Some(sorted(scene, self.radius, &self.lights));
+            self.map = Some(sorted(scene, self.radius, &self.settings, &self.lights));
             self.lights = Vec::new();
         }
         whole

@@ -81,36 +81,50 @@ pub(super) enum Source<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Interactions {
     pub photons: Vec<Photon>,
-    flight: Histories,
-    scatter: Histories,
+    /// Of each, for flight and scattering; `None` where paths have one alone.
+    pasts: Option<[Histories; 2]>,
 }
 
 impl Interactions {
-    pub fn new(groups: u8) -> Self {
-        Self { photons: Vec::new(), flight: Histories::new(groups), scatter: Histories::new(groups) }
+    /// None yet.
+    pub fn new(groups: u8, each_has_a_past: bool) -> Self {
+        let pasts = each_has_a_past.then(|| [Histories::new(groups), Histories::new(groups)]);
+        Self { photons: Vec::new(), pasts }
     }
 
+    /// None yet, kept as those of another.
+    pub fn like(other: &Self, groups: u8) -> Self {
+        Self::new(groups, other.pasts.is_some())
+    }
+
+    /// What an interaction depends on; `None` where that is not known apart from its path.
     #[inline]
-    pub fn past(&self, i: usize) -> Past {
-        Past { flight: self.flight.get(i), scatter: self.scatter.get(i) }
+    pub fn past(&self, i: usize) -> Option<Past> {
+        let [flight, scatter] = self.pasts.as_ref()?;
+        Some(Past { flight: flight.get(i), scatter: scatter.get(i) })
     }
 
     #[inline]
     fn push(&mut self, photon: Photon, past: &Past) {
         self.photons.push(photon);
-        self.flight.push(past.flight);
-        self.scatter.push(past.scatter);
+        if let Some([flight, scatter]) = &mut self.pasts {
+            flight.push(past.flight);
+            scatter.push(past.scatter);
+        }
     }
 
     /// Appends some of another's.
     pub fn extend(&mut self, other: &Self, range: std::ops::Range<usize>) {
         self.photons.extend_from_slice(&other.photons[range.clone()]);
-        self.flight.extend(&other.flight, range.clone());
-        self.scatter.extend(&other.scatter, range);
+        if let (Some([flight, scatter]), Some([of_flight, of_scatter])) = (&mut self.pasts, &other.pasts) {
+            flight.extend(of_flight, range.clone());
+            scatter.extend(of_scatter, range);
+        }
     }
 
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.photons[..]) + self.flight.bytes() + self.scatter.bytes()
+        let pasts = self.pasts.iter().flatten().map(Histories::bytes).sum::<usize>();
+        size_of_val(&self.photons[..]) + pasts
     }
 }
 

@@ -1,6 +1,7 @@
 //! Rays from the camera through matter that photons light \[Jonsson12, eq. 2\]: stretches of rays, a packet at a time.
 
-use super::map::{Gathering, PhotonMap};
+use super::gather::Gathering;
+use super::map::PhotonMap;
 use crate::math::{Ray, Rgb, Vec3};
 use crate::medium::{MOST_LANES, MarchNotes, PacketMarch, Track};
 use crate::scene::Scene;
@@ -64,6 +65,8 @@ impl View<'_> {
         let mut radiance = [Rgb::BLACK; MOST_LANES];
         let zero = S::f32s::splat(simd, 0.0);
         let (mut alpha, mut depth) = (zero, zero);
+        // For gathers that sort.
+        let mut distances = Vec::new();
         let mut march = PacketMarch::<S>::new(simd, &self.scene.medium, &stretches.tracks, self.step);
         let ends = |k: &[i32; MOST_LANES]| S::i32s::from_slice(simd, &k[..S::WIDTH]);
         march.go_between(ends(&stretches.from), ends(&stretches.to));
@@ -74,9 +77,14 @@ impl View<'_> {
                 if covered > 0.0 {
                     let [x, y, z] = sample.place;
                     let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
-                    let w_out = -stretches.rays[lane].direction;
-                    let value = sample.value.as_slice()[lane];
-                    *radiance += self.source(simd, place, value, w_out, lane, notes) * covered;
+                    let here = Sample {
+                        place,
+                        value: sample.value.as_slice()[lane],
+                        width: sample.width.as_slice()[lane],
+                        w_out: -stretches.rays[lane].direction,
+                        lane,
+                    };
+                    *radiance += self.source(simd, &here, &mut distances, notes) * covered;
                 }
             }
             alpha += covered;
@@ -91,24 +99,34 @@ impl View<'_> {
         found
     }
 
-    /// What a place sends along `w_out`, per unit extinction.
+    /// What a sample sends to the viewer, per unit extinction.
     #[inline(always)]
     fn source<S: Lanes>(
         &self,
         simd: S,
-        place: Vec3,
-        value: f32,
-        w_out: Vec3,
-        lane: usize,
+        sample: &Sample,
+        distances: &mut Vec<f32>,
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
+        let Sample { place, value, width, w_out, lane } = *sample;
         let medium = &*self.scene.medium;
         let optics = medium.transfer().optics(value);
         let Some(map) = self.map else { return optics.emitted() };
         let event = medium.event(place, &optics);
-        let at = Gathering { place, opacity: optics.opacity, event, w_out, lane };
-        optics.emitted() + map.scattered(simd, medium, &at, notes)
+        let at = Gathering { place, opacity: optics.opacity, event, w_out, width, lane };
+        optics.emitted() + map.scattered(simd, medium, &at, distances, notes)
     }
+}
+
+/// A sample of one ray.
+struct Sample {
+    /// Index space.
+    place: Vec3,
+    value: f32,
+    /// Of its step, world units.
+    width: f32,
+    w_out: Vec3,
+    lane: usize,
 }
 
 /// Writes down what each lane's stretch reads.

@@ -48,7 +48,8 @@ pub use light::Light;
 pub use medium::{Brdf, Medium, Phase};
 pub use patch::apply;
 pub use render::{
-    HistoryBins, Integrator, PathSettings, PhotonSettings, RaymarchSettings, Render, SpatialHistory,
+    Estimate, Histories, HistoryBins, Integrator, PathSettings, PhotonSettings, RaymarchSettings, Render,
+    SpatialHistory,
 };
 pub use schema::schema;
 pub use set::set;

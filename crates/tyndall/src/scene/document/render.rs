@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::shape::{
-    HistoryBits, LightSamples, MajorantCell, Photons, Radius, Samples, ScatteringOrder, Segments, StepLength,
-    StepsPerVoxel,
+    HistoryBits, LightSamples, MajorantCell, Nearest, Photons, Radius, Samples, ScatteringOrder, Segments,
+    StepLength, StepsPerVoxel,
 };
 
 /// How the picture is computed: the method, its effort, and its own settings.
@@ -119,6 +119,16 @@ pub struct PhotonSettings {
     #[schemars(with = "StepsPerVoxel")]
     pub steps_per_voxel: f32,
 
+    /// How light is estimated from photons.
+    pub estimate: Estimate,
+
+    /// Photons that the estimate `nearest` takes, as far as so many lie within the radius.
+    #[schemars(with = "Nearest")]
+    pub nearest: u32,
+
+    /// Which part of a light path has a history of its own.
+    pub histories: Histories,
+
     /// Bits of a Historygram: 32, 64 or 128 groups of data values that an edit is told apart by.
     #[schemars(with = "HistoryBits")]
     pub history_bits: u32,
@@ -137,11 +147,38 @@ impl Default for PhotonSettings {
             radius: 1.5,
             segments: 7,
             steps_per_voxel: 2.0,
+            estimate: Estimate::default(),
+            nearest: 32,
+            histories: Histories::default(),
             history_bits: 64,
             bins: HistoryBins::default(),
             spatial: SpatialHistory::default(),
         }
     }
+}
+
+/// How light is estimated from photons.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Estimate {
+    /// By all photons within the radius of a point.
+    #[default]
+    Point,
+    /// By the nearest photons, `nearest` of them; blurs less where there are many.
+    Nearest,
+    /// By all photons within the radius of the view ray: blurs nothing along it.
+    Beam,
+}
+
+/// Which part of a light path has a history of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Histories {
+    /// Each interaction: an edit retraces a path from where it touched it.
+    #[default]
+    Interactions,
+    /// The path as a whole: less memory, but a touched path is retraced from its beginning.
+    Paths,
 }
 
 /// How data values are put into groups that an edit is told apart by.

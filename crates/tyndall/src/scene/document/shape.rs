@@ -60,6 +60,8 @@ shapes! {
     Photons = { "type": "integer", "format": "uint32", "minimum": 1, "maximum": 268_435_456_u32 };
     /// A radius in voxels.
     Radius = { "type": "number", "format": "float", "minimum": 0.01, "maximum": 1000 };
+    /// A number of photons in an estimate; the nearest alone tells nothing.
+    Nearest = { "type": "integer", "format": "uint32", "minimum": 2, "maximum": 65_536_u32 };
     /// A number of parts of a view ray.
     Segments = { "type": "integer", "format": "uint32", "minimum": 1, "maximum": 256 };
     /// Steps per voxel.

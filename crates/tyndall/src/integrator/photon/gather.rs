@@ -1,0 +1,222 @@
+//! What photons tell about the light at a place \[Jonsson12, eq. 8\].
+
+use super::kernel::{Ball, Kernel, Slice};
+use super::map::PhotonMap;
+use super::matter::Matter;
+use crate::math::{Frame, PackedDirection, Rgb, Vec3};
+use crate::medium::{MarchNotes, Medium};
+use crate::scattering::{Brdf, Event, Phase};
+use crate::scene::Estimate;
+use crate::simd::{Lanes, unpack_directions};
+use fearless_simd::prelude::*;
+use std::f32::consts::{FRAC_1_PI, PI};
+
+/// Where light is gathered, and for whom.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gathering {
+    /// Index space.
+    pub place: Vec3,
+    /// Opacity there; positive but for rounding.
+    pub opacity: f32,
+    pub event: Event,
+    /// Towards the viewer.
+    pub w_out: Vec3,
+    /// World units of the viewer's ray that the place stands for.
+    pub width: f32,
+    /// Of the ray in its packet.
+    pub lane: usize,
+}
+
+impl PhotonMap {
+    /// Light from everywhere that a place scatters to a viewer, per unit extinction. `notes` hears of the values that are
+    /// read about the place.
+    #[inline(always)]
+    pub fn scattered<S: Lanes>(
+        &self,
+        simd: S,
+        medium: &Medium,
+        at: &Gathering,
+        distances: &mut Vec<f32>,
+        notes: &mut impl MarchNotes<S>,
+    ) -> Rgb {
+        let (radius, points) = (self.grid.radius(), &self.points);
+        match self.estimate {
+            Estimate::Point => self.within(simd, medium, at, &Ball { radius, points }, notes),
+            Estimate::Nearest(count) => {
+                let radius = self.radius_of(simd, at, count as usize, distances);
+                self.within(simd, medium, at, &Ball { radius, points }, notes)
+            }
+            Estimate::Beam => {
+                let slice = Slice { radius, width: at.width, frame: Frame::around(-at.w_out), points };
+                self.within(simd, medium, at, &slice, notes)
+            }
+        }
+    }
+
+    /// The estimate over a part of space.
+    #[inline(always)]
+    fn within<S: Lanes, K: Kernel>(
+        &self,
+        simd: S,
+        medium: &Medium,
+        at: &Gathering,
+        kernel: &K,
+        notes: &mut impl MarchNotes<S>,
+    ) -> Rgb {
+        let (q, here) = (self.grid.to_metric(at.place), (at.place, at.opacity, at.lane));
+        let matter = Matter::about(simd, medium, here, self.grid.index_per_metric(), kernel, notes);
+        if matter.opacity <= 0.0 {
+            return Rgb::BLACK;
+        }
+        let slope = matter.slope;
+        let mut sum = Sum::new(simd, at);
+        let number = S::f32s::from_fn(simd, |lane| lane as f32);
+        let [x, [y0, y1], [z0, z1]] = self.grid.around(q, kernel.reach());
+        for z in z0..=z1 {
+            for y in y0..=y1 {
+                let [mut i, end] = self.row(x, y, z);
+                while i < end {
+                    let [dx, dy, dz] = self.apart(simd, q, i);
+                    let there = number.simd_lt(S::f32s::splat(simd, (end - i) as f32));
+                    let near = kernel.holds(simd, [dx, dy, dz]) & there;
+                    if near.any_true() {
+                        let weight = -(dx * slope.x + dy * slope.y + dz * slope.z) + 1.0;
+                        sum.add(self, i, near, weight);
+                    }
+                    i += S::WIDTH;
+                }
+            }
+        }
+        sum.total() / (kernel.volume() * matter.opacity * medium.density())
+    }
+
+    /// Photons from the `i`-th on, relative to a metric place.
+    #[inline(always)]
+    fn apart<S: Lanes>(&self, simd: S, q: Vec3, i: usize) -> [S::f32s; 3] {
+        [load(simd, &self.x, i) - q.x, load(simd, &self.y, i) - q.y, load(simd, &self.z, i) - q.z]
+    }
+
+    /// Distance of the `count`-th nearest photon, at most the radius. The estimate takes those nearer than that one, which
+    /// leaves it without bias where photons lie evenly.
+    #[inline(always)]
+    fn radius_of<S: Lanes>(&self, simd: S, at: &Gathering, count: usize, distances: &mut Vec<f32>) -> f32 {
+        let (q, radius) = (self.grid.to_metric(at.place), self.grid.radius());
+        distances.clear();
+        let [x, [y0, y1], [z0, z1]] = self.grid.around(q, Vec3::splat(radius));
+        for z in z0..=z1 {
+            for y in y0..=y1 {
+                let [mut i, end] = self.row(x, y, z);
+                while i < end {
+                    let [dx, dy, dz] = self.apart(simd, q, i);
+                    let squared = dx * dx + dy * dy + dz * dz;
+                    let inside = squared.as_slice().iter().take(end - i).filter(|&&d| d < radius * radius);
+                    distances.extend(inside);
+                    i += S::WIDTH;
+                }
+            }
+        }
+        if distances.len() < count {
+            return radius;
+        }
+        let (_, nth, _) = distances.select_nth_unstable_by(count - 1, f32::total_cmp);
+        // Photons may lie on the very place; a sphere has some extent.
+        nth.sqrt().max(1e-3 * radius)
+    }
+}
+
+#[inline(always)]
+fn load<S: Lanes>(simd: S, numbers: &[f32], i: usize) -> S::f32s {
+    S::f32s::from_slice(simd, &numbers[i..i + S::WIDTH])
+}
+
+/// What photons add up to, each weighted by the scattering function.
+struct Sum<'a, S: Lanes> {
+    simd: S,
+    event: &'a Event,
+    w_out: Vec3,
+    kind: Scattering,
+    /// Still to be multiplied by the albedo.
+    lanes: [S::f32s; 3],
+    rest: Rgb,
+}
+
+/// How a photon's weight depends on its direction.
+#[derive(Clone, Copy, Debug)]
+enum Scattering {
+    /// Not at all.
+    Even,
+    /// By the phase function, and where there is a diffuse surface by the cosine to its side: share and normal.
+    Smooth(f32, Vec3),
+    /// By any BRDF.
+    Glossy,
+}
+
+impl<'a, S: Lanes> Sum<'a, S> {
+    #[inline(always)]
+    fn new(simd: S, at: &'a Gathering) -> Self {
+        let zero = S::f32s::splat(simd, 0.0);
+        let (event, w_out) = (&at.event, at.w_out);
+        let kind = match (event.normal, event.brdf, event.phase) {
+            (Some(normal), Brdf::Lambert, _) if event.is_surface() => {
+                let cos = normal.dot(w_out);
+                Scattering::Smooth(
+                    event.q,
+                    if cos == 0.0 { Vec3::ZERO } else { normal * 1.0_f32.copysign(cos) },
+                )
+            }
+            _ if event.is_surface() => Scattering::Glossy,
+            (_, _, Phase::Isotropic) => Scattering::Even,
+            _ => Scattering::Smooth(0.0, Vec3::ZERO),
+        };
+        Self { simd, event, w_out, kind, lanes: [zero; 3], rest: Rgb::BLACK }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, map: &PhotonMap, i: usize, near: S::mask32s, weight: S::f32s) {
+        let simd = self.simd;
+        let zero = S::f32s::splat(simd, 0.0);
+        let scattered = match self.kind {
+            Scattering::Even => S::f32s::splat(simd, 1.0 / (4.0 * PI)),
+            Scattering::Smooth(q, normal) => {
+                let words = S::u32s::from_slice(simd, &map.directions[i..i + S::WIDTH]);
+                let [x, y, z] = unpack_directions(simd, words);
+                let phase = self.event.phase.eval_between_lanes(simd, [x, y, z], self.w_out) * (1.0 - q);
+                // Light travels against the direction to where it comes from.
+                let cos = (-(x * normal.x + y * normal.y + z * normal.z)).max(zero);
+                cos * (q * FRAC_1_PI) + phase
+            }
+            Scattering::Glossy => return self.add_glossy(map, i, near.select(weight, zero)),
+        };
+        let weight = near.select(weight * scattered, zero);
+        let [red, green, blue] = self.lanes;
+        self.lanes = [
+            load(simd, &map.red, i).mul_add(weight, red),
+            load(simd, &map.green, i).mul_add(weight, green),
+            load(simd, &map.blue, i).mul_add(weight, blue),
+        ];
+    }
+
+    /// One by one.
+    #[inline(always)]
+    fn add_glossy(&mut self, map: &PhotonMap, first: usize, weights: S::f32s) {
+        for (i, &weight) in (first..).zip(weights.as_slice()) {
+            if weight != 0.0 {
+                let w_in = -PackedDirection::from_word(map.directions[i]).unpack();
+                let flux = Rgb::new(map.red[i], map.green[i], map.blue[i]);
+                self.rest += self.event.eval(self.w_out, w_in) * flux * weight;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn total(&self) -> Rgb {
+        let [red, green, blue] = self.lanes;
+        let sum = Rgb::new(total(red.as_slice()), total(green.as_slice()), total(blue.as_slice()));
+        sum * self.event.surface.albedo + self.rest
+    }
+}
+
+#[inline(always)]
+fn total(lanes: &[f32]) -> f32 {
+    lanes.iter().sum()
+}
