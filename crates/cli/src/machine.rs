@@ -5,7 +5,9 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tyndall::film::Film;
+use tyndall::integrator::PhotonMapping;
 use tyndall::message::place;
+use tyndall::scene::{IntegratorKind, RenderSettings};
 use tyndall::simd::Level;
 
 /// The widest vector instructions, or those that `TYNDALL_SIMD` names.
@@ -76,6 +78,25 @@ pub fn check_film(size: [u32; 2], input: &Path) -> Result<(), Failure> {
             place(input),
             size[0],
             size[1],
+            needed >> 20,
+            available >> 20
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses photons for which there is no memory.
+pub fn check_photons(render: &RenderSettings, size: [u32; 2], input: &Path) -> Result<(), Failure> {
+    let IntegratorKind::Photon(settings) = render.integrator else { return Ok(()) };
+    let needed = PhotonMapping::most_bytes(&settings, render.max_scatter, size);
+    match tyndall_formats::memory::available() {
+        Some(available) if needed > available => Err(Failure::input(format!(
+            "{}: render.photon.photons: {} light paths of up to {} scatterings and {} segments a pixel may need {} MiB, but {} MiB \
+             are free; expected fewer of them",
+            place(input),
+            settings.photons,
+            render.max_scatter,
+            settings.segments,
             needed >> 20,
             available >> 20
         ))),

@@ -3,7 +3,7 @@
 use crate::Failure;
 use crate::args::RenderOptions;
 use crate::input::Input;
-use crate::machine::{Interrupt, check_film, pool, vector_instructions};
+use crate::machine::{Interrupt, check_film, check_photons, pool, vector_instructions};
 use crate::output;
 use crate::progress::Display;
 use crate::stats::{Stages, peak_memory};
@@ -54,6 +54,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let scene = threads
         .install(|| Scene::build(&document, &assets))
         .map_err(|e| Failure::input(format!("{}: {e}", place(&options.input))))?;
+    check_photons(&scene.render, scene.size, &options.input)?;
     if !options.run.quiet {
         for text in source.notes.iter().map(String::as_str).chain(scene.notes()) {
             drop(writeln!(std::io::stderr(), "tyndall: note: {}", sentence(text)));

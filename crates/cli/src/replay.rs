@@ -3,7 +3,7 @@
 use crate::args::ReplayOptions;
 use crate::edits::{self, Edit};
 use crate::input::{Input, of_assets};
-use crate::machine::{Interrupt, check_film, pool, vector_instructions};
+use crate::machine::{Interrupt, check_film, check_photons, pool, vector_instructions};
 use crate::{Failure, output, say};
 use serde_json::{Map, Value, json};
 use std::io::Write;
@@ -11,6 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 use tyndall::film::Image;
+use tyndall::integrator::Kept;
 use tyndall::message::{excerpt, place, sentence};
 use tyndall::scene::document::{self, Document};
 use tyndall::scene::{Assets, Scene};
@@ -110,13 +111,20 @@ struct Report {
     check: Option<Check>,
 }
 
+/// What there was before an edit.
+struct Before {
+    samples: u32,
+    image: Image,
+    kept: Option<Kept>,
+}
+
 /// A live picture held against one from nothing.
 struct Check {
     scratch_s: f64,
     max_abs_diff: f64,
-    /// Pixels that were kept and are wrong.
+    /// Pixels, or light paths and segments, that were kept and are wrong.
     false_negatives: usize,
-    /// Pixels that were computed again for nothing; `None` where the pictures before and after cannot be compared.
+    /// Those that were computed again for nothing; `None` where before and after cannot be compared.
     false_positives: Option<usize>,
 }
 
@@ -156,7 +164,11 @@ impl<'a> Live<'a> {
     fn play(&mut self, edit: &Edit, verify: bool) -> Result<Report, Failure> {
         let before = verify.then(|| {
             self.refine(self.document.render.samples);
-            (self.session.film().samples(), self.session.image())
+            Before {
+                samples: self.session.film().samples(),
+                image: self.session.image(),
+                kept: self.session.kept(),
+            }
         });
 
         let begun = Instant::now();
@@ -172,7 +184,7 @@ impl<'a> Live<'a> {
             return Err(Failure::Interrupted);
         }
         let recomputed = self.session.recomputed().to_vec();
-        let check = before.map(|before| self.check(&recomputed, before)).transpose()?;
+        let check = before.map(|before| self.check(&recomputed, &before)).transpose()?;
         Ok(Report { latency_s, recomputed, check })
     }
 
@@ -187,17 +199,15 @@ impl<'a> Live<'a> {
     }
 
     /// Renders the edited scene from nothing, and compares.
-    fn check(
-        &mut self,
-        recomputed: &[(&'static str, f64)],
-        (samples_before, before): (u32, Image),
-    ) -> Result<Check, Failure> {
+    fn check(&mut self, recomputed: &[(&'static str, f64)], before: &Before) -> Result<Check, Failure> {
         let begun = Instant::now();
         let (document, assets) = self.parse(&self.value)?;
         let scene = build(&self.pool, &document, &assets, self.path)?;
         let mut fresh = Session::with_level(scene, self.pool.clone(), self.level);
         refine(&mut fresh, 1, self.interrupt);
         let scratch_s = begun.elapsed().as_secs_f64();
+
+        let of_items = self.session.kept().zip(self.session.computed()).zip(fresh.kept());
 
         // Pictures are equal at equal numbers of samples, of which a kept one may have more than were asked for.
         let samples = document.render.samples.max(self.session.film().samples());
@@ -208,15 +218,17 @@ impl<'a> Live<'a> {
         }
         let (live, fresh) = (self.session.image(), fresh.image());
         let differing = live.rgba.iter().zip(&fresh.rgba).filter(|(a, b)| a != b).count();
-        let redone = recomputed.iter().any(|(_, share)| *share > 0.0);
-        let same_as_before = || before.rgba.iter().zip(&live.rgba).filter(|(a, b)| a == b).count();
-        let comparable = before.size == live.size && samples_before == samples;
-        Ok(Check {
-            scratch_s,
-            max_abs_diff: farthest(&live, &fresh),
-            false_negatives: if redone { 0 } else { differing },
-            false_positives: if redone { comparable.then(same_as_before) } else { Some(0) },
-        })
+        let (false_negatives, false_positives) = if let Some(((kept, computed), of_fresh)) = of_items {
+            let positives = |before| computed.saturating_sub(kept.changed_since(before));
+            (kept.differing(&of_fresh), before.kept.as_ref().map(positives))
+        } else {
+            let redone = recomputed.iter().any(|(_, share)| *share > 0.0);
+            let same_as_before = || before.image.rgba.iter().zip(&live.rgba).filter(|(a, b)| a == b).count();
+            let comparable = before.image.size == live.size && before.samples == samples;
+            let positives = if redone { comparable.then(same_as_before) } else { Some(0) };
+            (if redone { 0 } else { differing }, positives)
+        };
+        Ok(Check { scratch_s, max_abs_diff: farthest(&live, &fresh), false_negatives, false_positives })
     }
 }
 
@@ -230,8 +242,11 @@ fn build(
     assets: &Assets,
     path: &Path,
 ) -> Result<Scene, Failure> {
-    pool.install(|| Scene::build(document, assets))
-        .map_err(|e| Failure::input(format!("{}: {e}", place(path))))
+    let scene = pool
+        .install(|| Scene::build(document, assets))
+        .map_err(|e| Failure::input(format!("{}: {e}", place(path))))?;
+    check_photons(&scene.render, scene.size, path)?;
+    Ok(scene)
 }
 
 /// The largest difference of two pictures of one size, over all channels.

@@ -1,7 +1,7 @@
 //! A session: a scene, its integrator and the film, refined slice by slice.
 
 use crate::film::{Film, Image};
-use crate::integrator::{Integrator, Stop, TileState};
+use crate::integrator::{Integrator, Kept, Stop, TileState};
 use crate::scene::{Difference, IntegratorKind, Scene};
 use crate::simd::Level;
 use rayon::prelude::*;
@@ -101,6 +101,19 @@ impl Session {
                 vec![("photons", share(photon.paths())), ("segments", share(segments))]
             }
         }
+    }
+
+    /// How many light paths and segments were computed since the last edit; `None` for a method that keeps pixels alone.
+    #[must_use]
+    pub fn computed(&self) -> Option<usize> {
+        let Integrator::Photon(photon) = &self.integrator else { return None };
+        Some(photon.paths()[1] + self.tiles.iter().map(|tile| tile.segments()[1]).sum::<usize>())
+    }
+
+    /// A copy of what the session keeps through edits beside pixels, for checks.
+    #[must_use]
+    pub fn kept(&self) -> Option<Kept> {
+        Kept::of(&self.integrator, &self.tiles)
     }
 
     /// Seconds spent since the last edit, or since the beginning: of a photon mapper on `photons` and on `segments` and later

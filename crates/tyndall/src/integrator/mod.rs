@@ -14,7 +14,7 @@ use crate::film::Tile;
 use crate::scene::{Difference, IntegratorKind, Scene};
 use crate::simd::Level;
 use path::Walk;
-use photon::SegmentTile;
+use photon::{Paths, SegmentTile};
 use raymarch::Packet;
 
 /// A method. Everything about a sample follows from its pixel and number.
@@ -116,6 +116,48 @@ impl Integrator {
                 }
             }
         }
+    }
+}
+
+/// What a photon mapper kept at one time: for checks.
+#[derive(Clone, Debug)]
+pub struct Kept {
+    paths: Paths,
+    segments: Vec<Option<SegmentTile>>,
+}
+
+impl Kept {
+    /// Of an integrator and its tiles; `None` for a method that keeps nothing but pixels.
+    #[must_use]
+    pub fn of(integrator: &Integrator, tiles: &[TileState]) -> Option<Self> {
+        let Integrator::Photon(photon) = integrator else { return None };
+        let segments = tiles.iter().map(|tile| tile.segments.clone()).collect();
+        Some(Self { paths: photon.light_paths(), segments })
+    }
+
+    /// Light paths and segments that are there at both times, and are other ones.
+    #[must_use]
+    pub fn differing(&self, other: &Self) -> usize {
+        self.paths.differing(&other.paths) + self.segments_differing(other)[0]
+    }
+
+    /// Light paths and segments that are other ones than before, or were not there.
+    #[must_use]
+    pub fn changed_since(&self, before: &Self) -> usize {
+        self.paths.differing(&before.paths) + self.segments_differing(before).iter().sum::<usize>()
+    }
+
+    fn segments_differing(&self, other: &Self) -> [usize; 2] {
+        let mut counts = [0; 2];
+        for (i, tile) in self.segments.iter().enumerate() {
+            let Some(tile) = tile else { continue };
+            let [both, here] = match other.segments.get(i) {
+                Some(Some(other)) if other.len() == tile.len() => tile.differing(other),
+                _ => [0, tile.len()],
+            };
+            counts = [counts[0] + both, counts[1] + here];
+        }
+        counts
     }
 }
 

@@ -26,6 +26,18 @@ pub fn index(x: f32) -> usize {
     x as usize
 }
 
+/// Cuts the fraction of a non-negative number off; saturates at the largest `u64`; negative numbers and NaN become 0.
+#[inline]
+#[must_use]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "`as` saturates, which is what is documented"
+)]
+pub fn whole(x: f64) -> u64 {
+    x as u64
+}
+
 /// Nearest single-precision number.
 #[inline]
 #[must_use]

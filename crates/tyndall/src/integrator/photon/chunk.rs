@@ -78,6 +78,17 @@ impl Chunk {
         Past { flight: self.flight.get(path), scatter: self.scatter.get(path) }
     }
 
+    /// Paths that are other ones in another chunk of the same paths.
+    pub fn differing(&self, other: &Self) -> usize {
+        let photons =
+            |chunk: &Self, path| bytemuck::cast_slice::<_, u8>(&chunk.photons()[chunk.range(path)]).to_vec();
+        let known = self.traced && other.traced && self.paths == other.paths;
+        if !known {
+            return self.len();
+        }
+        (0..self.len()).filter(|&path| photons(self, path) != photons(other, path)).count()
+    }
+
     /// The interactions of a path that the changes leave valid: since histories only grow along a path, all up to one
     /// \[Jonsson12, sec. 4.3.1\].
     fn valid(&self, path: usize) -> Range<usize> {

@@ -105,18 +105,23 @@ pub(super) struct Points {
     disk: [[f32; MOST_LANES]; 2],
 }
 
+/// The shares of the volume within which the points on a spiral lie, by which their second moments are those of the whole.
+const SHARES_OF_BALL: [u8; MOST_LANES / 2] = [0, 2, 4, 7, 6, 5, 3, 1];
+const SHARES_OF_DISK: [u8; MOST_LANES / 2] = [0, 3, 6, 2, 5, 1, 4, 7];
+
 impl Points {
     pub fn new() -> Self {
         let mut points = Self { ball: [[0.0; MOST_LANES]; 3], disk: [[0.0; MOST_LANES]; 2] };
         let pairs = MOST_LANES / 2;
         for pair in 0..pairs {
-            let share = |i: usize| (i as f32 + 0.5) / pairs as f32;
-            // Golden-angle spirals over one half, at radii that halve all volumes alike; neighbours at unlike ones.
+            let share = |i: f32| (i + 0.5) / pairs as f32;
+            // A golden-angle spiral over one half of the sphere of directions.
             let (sin, cos) = (pair as f32 * PI * (3.0 - 5.0_f32.sqrt())).sin_cos();
-            let (height, within) = (share(pair), share(pair * 3 % pairs));
+            let (height, within) = (share(pair as f32), share(f32::from(SHARES_OF_BALL[pair])));
             let across = (1.0 - height * height).sqrt();
             let in_ball = Vec3::new(across * cos, across * sin, height) * within.cbrt();
-            let (sin, cos) = (PI * share(pair)).sin_cos();
+            let (sin, cos) = (PI * share(pair as f32)).sin_cos();
+            let within = share(f32::from(SHARES_OF_DISK[pair]));
             let in_disk = [cos, sin].map(|x| x * within.sqrt());
             for (point, sign) in [(2 * pair, 1.0), (2 * pair + 1, -1.0)] {
                 for (axis, x) in points.ball.iter_mut().zip(in_ball.to_array()) {
@@ -151,13 +156,13 @@ mod tests {
         for (a, row) in moments(&points.ball).iter().enumerate() {
             for (b, &found) in row.iter().enumerate() {
                 let expected = if a == b { 0.2 } else { 0.0 };
-                assert!((found - expected).abs() < 0.04, "ball {a} {b}: {found}");
+                assert!((found - expected).abs() < 0.01, "ball {a} {b}: {found}");
             }
         }
         for (a, row) in moments(&points.disk).iter().enumerate() {
             for (b, &found) in row.iter().enumerate() {
                 let expected = if a == b { 0.25 } else { 0.0 };
-                assert!((found - expected).abs() < 0.04, "disk {a} {b}: {found}");
+                assert!((found - expected).abs() < 0.01, "disk {a} {b}: {found}");
             }
         }
     }

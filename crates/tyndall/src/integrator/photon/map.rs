@@ -32,6 +32,9 @@ pub(super) struct Lit<'a> {
     pub scale: Rgb,
 }
 
+/// Bytes of a photon in the map, and of its sorting key.
+pub(super) const BYTES: u64 = 28 + 8;
+
 /// Bits of a sorting key for the place in a chunk, then for the chunk, then for the cell.
 const PLACE_BITS: u32 = 20;
 const CHUNK_BITS: u32 = 20;

@@ -95,6 +95,18 @@ impl PhotonMapping {
         }
     }
 
+    /// Bytes that photons and segments take at most, but for chance: with every path as long as it may
+    /// be, and a refinement pass beside the base map.
+    #[must_use]
+    pub fn most_bytes(settings: &PhotonSettings, max_scatter: u32, size: [u32; 2]) -> u64 {
+        let history = u64::from(settings.history_bits).div_ceil(8);
+        let photon = size_of::<paths::Photon>() as u64 + map::BYTES;
+        let interactions = paths::most_kept(max_scatter) * (2 * photon + 2 * history) as f64;
+        let paths = f64::from(settings.photons) * (interactions + (16 + 2 * history) as f64);
+        let segments = u64::from(size[0]) * u64::from(size[1]) * u64::from(settings.segments);
+        crate::math::cast::whole(paths).saturating_add(segments.saturating_mul(segments::BYTES + history))
+    }
+
     /// Makes the photons ready from which a sample is to be taken, those of the base map for the first; false where a stop
     /// came before.
     pub(super) fn prepare<'s>(
@@ -168,6 +180,11 @@ impl PhotonMapping {
         [all, self.traced.load(Ordering::Relaxed)]
     }
 
+    /// Paths, as they are now.
+    pub(super) fn light_paths(&self) -> Paths {
+        Paths(self.lights.clone())
+    }
+
     /// Begins to count the paths traced.
     pub(super) fn count_anew(&self) {
         self.traced.store(0, Ordering::Relaxed);
@@ -184,6 +201,25 @@ impl PhotonMapping {
     pub fn bytes(&self) -> usize {
         let chunks = self.lights.iter().flat_map(|light| &light.chunks);
         chunks.map(chunk::Chunk::bytes).sum::<usize>() + self.map.as_ref().map_or(0, PhotonMap::bytes)
+    }
+}
+
+/// The paths of all lights at one time.
+#[derive(Clone, Debug)]
+pub(super) struct Paths(Vec<LightPaths>);
+
+impl Paths {
+    /// How many are other ones at another time, or were not there.
+    pub fn differing(&self, other: &Self) -> usize {
+        let of_light = |light: &LightPaths| {
+            let same = other.0.iter().find(|other| other.stream == light.stream);
+            let chunks = light.chunks.iter().enumerate();
+            let differing = chunks.map(|(i, chunk)| {
+                same.and_then(|same| same.chunks.get(i)).map_or(chunk.len(), |other| chunk.differing(other))
+            });
+            differing.sum::<usize>()
+        };
+        self.0.iter().map(of_light).sum()
     }
 }
 

@@ -26,7 +26,7 @@ pub(super) struct Pass {
 /// How much of each pass's variance stays; between 0 and 1, here what \[Knaus11\] found best.
 const ALPHA: f64 = 2.0 / 3.0;
 
-/// Radius of a pass over that of the base map: volumes shrink as `(i + alpha) / (i + 1)` \[Knaus11, eq. 20\].
+/// Radius of a pass over that of the base map: volumes shrink as `(i + alpha) / (i + 1)` \[Knaus11\].
 fn shrunk(pass: u32) -> f32 {
     let volume: f64 = (1..=pass).map(|i| (f64::from(i) + ALPHA) / (f64::from(i) + 1.0)).product();
     crate::math::cast::single(volume.cbrt())

@@ -43,6 +43,14 @@ impl Photon {
     }
 }
 
+/// Interactions of a path that are kept on average if none is absorbed: of `max_scatter` the first few, and of the others the
+/// sum of their chances.
+pub(super) fn most_kept(max_scatter: u32) -> f64 {
+    let whole = f64::from(WHOLE);
+    let last = f64::from(max_scatter);
+    if last <= whole { last } else { whole * (1.0 + (last / whole).ln()) }
+}
+
 /// What an interaction depends on: values met in flight, whose opacity mattered, and values where light scattered, whose
 /// albedo and surfaces mattered. Both with all that came before on the path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -250,5 +258,20 @@ impl Tracer<'_> {
             flux: Rgb::from(photon.flux) * (scattered.weight / survival),
             bounce: photon.bounce + 1,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_paths_keep_few_interactions() {
+        for max_scatter in [0, 1, 4, 5, 64, 10_000] {
+            let sum: f64 = (0..max_scatter)
+                .map(|bounce| f64::from(Photon { bounce, ..Photon::zeroed() }.chance()))
+                .sum();
+            assert!((most_kept(max_scatter) - sum).abs() < 0.6, "{sum} of {max_scatter}");
+        }
     }
 }

@@ -27,6 +27,9 @@ pub(crate) struct SegmentTile {
     pub computed: usize,
 }
 
+/// Bytes of a segment without its Historygram.
+pub(super) const BYTES: u64 = 20;
+
 /// Transmittance of a segment that is not known.
 const UNKNOWN: [f32; 4] = [0.0, 0.0, 0.0, f32::NAN];
 
@@ -52,6 +55,19 @@ impl SegmentTile {
     /// Bytes kept.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.light[..]) + size_of_val(&self.depth[..]) + self.histories.bytes()
+    }
+
+    /// Segments known here and there, with another light; and those known here alone.
+    pub fn differing(&self, other: &Self) -> [usize; 2] {
+        let mut counts = [0; 2];
+        for (here, there) in self.light.iter().zip(&other.light) {
+            match [here[3].is_nan(), there[3].is_nan()] {
+                [false, false] => counts[0] += usize::from(here.map(f32::to_bits) != there.map(f32::to_bits)),
+                [false, true] => counts[1] += 1,
+                _ => {}
+            }
+        }
+        counts
     }
 
     /// What values an edit changed; photons may have changed anywhere.

@@ -3,17 +3,11 @@
 use super::node::{Node, TAG};
 
 /// Tables of the document that this version does not have yet, by their path.
-const LATER_KEYS: [&str; 6] = [
-    "objects",
-    "surfaces",
-    "render.photon",
-    "render.many_light",
-    "render.irradiance_cache",
-    "render.refractive",
-];
+const LATER_KEYS: [&str; 5] =
+    ["objects", "surfaces", "render.many_light", "render.irradiance_cache", "render.refractive"];
 
 /// Integrators that this version does not have yet.
-const LATER_INTEGRATORS: [&str; 4] = ["photon", "many-light", "irradiance-cache", "refractive"];
+const LATER_INTEGRATORS: [&str; 3] = ["many-light", "irradiance-cache", "refractive"];
 
 /// The mend for a key that `node` does not have.
 pub(super) fn unknown_key(path: &str, key: &str, node: Node, union: Node) -> String {

@@ -149,7 +149,7 @@ fn what_is_left_out_has_its_default() {
     let written = scene(&json!({
         "volume": { "procedural": {} },
         "transfer_function": { "points": [point(0.0)] },
-        "medium": {}, "lights": [], "camera": {}, "film": {}, "render": { "raymarch": {}, "path": {} }, "clip": []
+        "medium": {}, "lights": [], "camera": {}, "film": {}, "render": { "raymarch": {}, "path": {}, "photon": {} }, "clip": []
     }));
     let document = written.unwrap();
     assert_eq!(document.volume.procedural, Some(Procedural::default()));
@@ -176,7 +176,11 @@ fn what_is_left_out_has_its_default() {
             "/render",
             json!({
                 "integrator": "path", "max_scatter": 64, "samples": 64, "seed": 0,
-                "raymarch": { "step": 0.5, "light_samples": 16 }, "path": { "majorant_cell": 8 }
+                "raymarch": { "step": 0.5, "light_samples": 16 }, "path": { "majorant_cell": 8 },
+                "photon": {
+                    "photons": 1_048_576, "radius": 1.5, "segments": 7, "steps_per_voxel": 2.0, "estimate": "point",
+                    "nearest": 32, "histories": "interactions", "history_bits": 64, "bins": "quantile", "spatial": "cells"
+                }
             }),
         ),
     ] {

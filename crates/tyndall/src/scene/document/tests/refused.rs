@@ -51,18 +51,11 @@ fn an_unknown_word_suggests_the_nearest() {
 
 #[test]
 fn what_comes_with_later_versions_says_so() {
-    for path in [
-        "objects",
-        "surfaces",
-        "render.photon",
-        "render.many_light",
-        "render.irradiance_cache",
-        "render.refractive",
-    ] {
+    for path in ["objects", "surfaces", "render.many_light", "render.irradiance_cache", "render.refractive"] {
         let message = refused(&nested(path, json!({})), path);
         assert!(message.contains(&format!("does not have `{path}` yet")), "{message}");
     }
-    for name in ["photon", "many-light", "irradiance-cache", "refractive"] {
+    for name in ["many-light", "irradiance-cache", "refractive"] {
         let message = refused(&nested("render.integrator", name.into()), "render.integrator");
         assert!(message.contains(&format!("does not have the integrator `{name}` yet")), "{message}");
     }
