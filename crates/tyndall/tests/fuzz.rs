@@ -126,6 +126,9 @@ fn try_scene(text: &str, json: bool, volume: Arc<Volume>) -> Result<(), String> 
     document.render.max_scatter = document.render.max_scatter.min(50);
     document.render.raymarch.light_samples = document.render.raymarch.light_samples.min(4);
     document.render.raymarch.step = document.render.raymarch.step.max(0.2);
+    document.render.photon.photons = document.render.photon.photons.min(300);
+    document.render.photon.segments = document.render.photon.segments.min(9);
+    document.render.photon.steps_per_voxel = document.render.photon.steps_per_voxel.min(4.0);
     let names = ["map.exr", "a.hdr"].map(|name| (name.to_owned(), MAP.clone()));
     let assets = Assets { volume, maps: BTreeMap::from(names) };
     let scene = THREADS.install(|| Scene::build(&document, &assets)).map_err(|e| helpful(&e))?;

@@ -87,6 +87,9 @@ impl PhotonMapping {
             light.chunks.iter_mut().for_each(|chunk| chunk.add_change(&query.paths));
         }
         self.update_lights(new, query.glow);
+        if difference.density.is_some() {
+            self.map = None;
+        }
         if difference.camera || difference.size {
             self.has_segments = false;
         }

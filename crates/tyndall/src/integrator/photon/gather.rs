@@ -39,15 +39,15 @@ impl PhotonMap {
         distances: &mut Vec<f32>,
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
-        let (radius, points) = (self.grid.radius(), &self.points);
+        let points = &self.points;
         match self.estimate {
-            Estimate::Point => self.within(simd, medium, at, &Ball { radius, points }, notes),
+            Estimate::Point => self.within(simd, medium, at, &Ball { radius: 1.0, points }, notes),
             Estimate::Nearest(count) => {
                 let radius = self.radius_of(simd, at, count as usize, distances);
                 self.within(simd, medium, at, &Ball { radius, points }, notes)
             }
             Estimate::Beam => {
-                let slice = Slice { radius, width: at.width, frame: Frame::around(-at.w_out), points };
+                let slice = Slice { width: at.width / self.radius, frame: Frame::around(-at.w_out), points };
                 self.within(simd, medium, at, &slice, notes)
             }
         }
@@ -87,7 +87,7 @@ impl PhotonMap {
                 }
             }
         }
-        sum.total() / (kernel.volume() * matter.opacity * medium.density())
+        sum.total() / (kernel.volume() * matter.opacity)
     }
 
     /// Photons from the `i`-th on, relative to a metric place.
@@ -96,31 +96,31 @@ impl PhotonMap {
         [load(simd, &self.x, i) - q.x, load(simd, &self.y, i) - q.y, load(simd, &self.z, i) - q.z]
     }
 
-    /// Distance of the `count`-th nearest photon, at most the radius. The estimate takes those nearer than that one, which
+    /// Distance of the `count`-th nearest photon, at most the radius, in units of it. The estimate takes those nearer than that one, which
     /// leaves it without bias where photons lie evenly.
     #[inline(always)]
     fn radius_of<S: Lanes>(&self, simd: S, at: &Gathering, count: usize, distances: &mut Vec<f32>) -> f32 {
-        let (q, radius) = (self.grid.to_metric(at.place), self.grid.radius());
+        let q = self.grid.to_metric(at.place);
         distances.clear();
-        let [x, [y0, y1], [z0, z1]] = self.grid.around(q, Vec3::splat(radius));
+        let [x, [y0, y1], [z0, z1]] = self.grid.around(q, Vec3::ONE);
         for z in z0..=z1 {
             for y in y0..=y1 {
                 let [mut i, end] = self.row(x, y, z);
                 while i < end {
                     let [dx, dy, dz] = self.apart(simd, q, i);
                     let squared = dx * dx + dy * dy + dz * dz;
-                    let inside = squared.as_slice().iter().take(end - i).filter(|&&d| d < radius * radius);
+                    let inside = squared.as_slice().iter().take(end - i).filter(|&&d| d < 1.0);
                     distances.extend(inside);
                     i += S::WIDTH;
                 }
             }
         }
         if distances.len() < count {
-            return radius;
+            return 1.0;
         }
         let (_, nth, _) = distances.select_nth_unstable_by(count - 1, f32::total_cmp);
         // Photons may lie on the very place; a sphere has some extent.
-        nth.sqrt().max(1e-3 * radius)
+        nth.sqrt().max(1e-3)
     }
 }
 

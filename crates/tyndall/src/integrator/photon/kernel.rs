@@ -1,4 +1,4 @@
-//! Over which part of space a gather takes photons together.
+//! Over which part of space a gather takes photons together; lengths in units of the map's radius.
 
 use crate::math::{Frame, Vec3};
 use crate::medium::MOST_LANES;
@@ -11,7 +11,7 @@ pub(super) trait Kernel: Copy {
     /// How far it reaches along each axis.
     fn reach(&self) -> Vec3;
 
-    /// World units cubed.
+    /// In units of the radius cubed.
     fn volume(&self) -> f32;
 
     /// Whether it holds what lies so far from the place.
@@ -58,8 +58,7 @@ impl Kernel for Ball<'_> {
 /// make one beam, along which nothing is blurred.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slice<'a> {
-    pub radius: f32,
-    /// World units along the ray.
+    /// Along the ray.
     pub width: f32,
     /// About the ray's direction.
     pub frame: Frame,
@@ -69,11 +68,11 @@ pub(super) struct Slice<'a> {
 impl Kernel for Slice<'_> {
     fn reach(&self) -> Vec3 {
         let along = self.frame.w.abs();
-        (Vec3::ONE - along * along).max(Vec3::ZERO).map(f32::sqrt) * self.radius + along * (0.5 * self.width)
+        (Vec3::ONE - along * along).max(Vec3::ZERO).map(f32::sqrt) + along * (0.5 * self.width)
     }
 
     fn volume(&self) -> f32 {
-        PI * self.radius * self.radius * self.width
+        PI * self.width
     }
 
     #[inline(always)]
@@ -83,7 +82,7 @@ impl Kernel for Slice<'_> {
         let aside = x * x + y * y + z * z - along * along;
         // Half open, so that no photon counts in two steps.
         let half = 0.5 * self.width;
-        aside.simd_lt(S::f32s::splat(simd, self.radius * self.radius))
+        aside.simd_lt(S::f32s::splat(simd, 1.0))
             & along.simd_ge(S::f32s::splat(simd, -half))
             & along.simd_lt(S::f32s::splat(simd, half))
     }
@@ -91,8 +90,8 @@ impl Kernel for Slice<'_> {
     #[inline(always)]
     fn points<S: Lanes>(&self, simd: S, first: usize) -> [S::f32s; 3] {
         let Points { disk: [a, b], .. } = self.points;
-        let a = S::f32s::from_slice(simd, &a[first..first + S::WIDTH]) * self.radius;
-        let b = S::f32s::from_slice(simd, &b[first..first + S::WIDTH]) * self.radius;
+        let a = S::f32s::from_slice(simd, &a[first..first + S::WIDTH]);
+        let b = S::f32s::from_slice(simd, &b[first..first + S::WIDTH]);
         let Frame { u, v, .. } = self.frame;
         [a * u.x + b * v.x, a * u.y + b * v.y, a * u.z + b * v.z]
     }

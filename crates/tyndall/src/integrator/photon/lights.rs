@@ -116,9 +116,9 @@ impl LightPaths {
         self.chunks.iter_mut().zip(old.chunks).take(chunks).for_each(|(new, old)| *new = old);
     }
 
-    /// What the flux of its photons is to be multiplied by: each path is one of many.
-    pub fn scale(&self) -> Rgb {
-        self.light.as_ref().map_or(Rgb::WHITE, Light::color) / self.count as f32
+    /// What the flux of its photons is to be multiplied by.
+    pub fn color(&self) -> Rgb {
+        self.light.as_ref().map_or(Rgb::WHITE, Light::color)
     }
 
     fn source<'a>(light: Option<&'a Light>, scene: &'a Scene) -> Option<Source<'a>> {

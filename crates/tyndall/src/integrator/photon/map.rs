@@ -3,7 +3,7 @@
 use super::chunk::Chunk;
 use super::grid::CellGrid;
 use super::kernel::Points;
-use crate::math::{Rgb, cast};
+use crate::math::{DVec3, Vec3, cast};
 use crate::scene::Estimate;
 use rayon::prelude::*;
 
@@ -12,6 +12,8 @@ use rayon::prelude::*;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PhotonMap {
     pub(super) grid: CellGrid,
+    /// World units.
+    pub(super) radius: f32,
     pub(super) points: Points,
     pub(super) estimate: Estimate,
     /// Where each cell begins.
@@ -20,7 +22,7 @@ pub(super) struct PhotonMap {
     pub(super) y: Vec<f32>,
     pub(super) z: Vec<f32>,
     pub(super) directions: Vec<u32>,
-    /// Flux.
+    /// Flux, over density and radius cubed.
     pub(super) red: Vec<f32>,
     pub(super) green: Vec<f32>,
     pub(super) blue: Vec<f32>,
@@ -29,7 +31,7 @@ pub(super) struct PhotonMap {
 /// Chunks of one light, with what their photons' flux is to be multiplied by.
 pub(super) struct Lit<'a> {
     pub chunks: &'a [Chunk],
-    pub scale: Rgb,
+    pub scale: DVec3,
 }
 
 /// Bytes of a photon in the map, and of its sorting key.
@@ -41,8 +43,8 @@ const CHUNK_BITS: u32 = 20;
 
 impl PhotonMap {
     /// Sorts the photons of all lights.
-    pub fn new(grid: CellGrid, estimate: Estimate, lights: &[Lit]) -> Self {
-        let chunks: Vec<(&Chunk, Rgb)> =
+    pub fn new(grid: CellGrid, radius: f32, estimate: Estimate, lights: &[Lit]) -> Self {
+        let chunks: Vec<(&Chunk, DVec3)> =
             lights.iter().flat_map(|lit| lit.chunks.iter().map(|chunk| (chunk, lit.scale))).collect();
         assert!(chunks.len() < 1 << CHUNK_BITS, "{} chunks", chunks.len());
         let mut keys: Vec<u64> = chunks
@@ -69,6 +71,7 @@ impl PhotonMap {
 
         let room = keys.len() + crate::medium::MOST_LANES;
         let mut map = Self {
+            radius,
             points: Points::new(),
             estimate,
             grid,
@@ -91,8 +94,8 @@ impl PhotonMap {
                 let photon = chunk.photons()[cast::low_u32(key & ((1 << PLACE_BITS) - 1)) as usize];
                 [*x, *y, *z] = grid.to_metric(photon.index_place()).to_array();
                 *direction = photon.direction.word();
-                let flux = photon.whole_flux() * scale;
-                [*red, *green, *blue] = flux.to_array();
+                let flux = Vec3::from_array(photon.whole_flux().to_array()).as_dvec3() * scale;
+                [*red, *green, *blue] = flux.to_array().map(cast::single);
             },
         );
         map

@@ -24,7 +24,7 @@ const LEAST_SPREAD: f32 = 0.02;
 pub(super) struct Matter {
     /// Opacity by which the weighted flux is to be divided.
     pub opacity: f32,
-    /// A photon's weight falls by so much per unit of metric space.
+    /// A photon's weight falls by so much per radius.
     pub slope: Vec3,
 }
 

@@ -29,6 +29,7 @@ pub(crate) use segments::SegmentTile;
 use super::Stop;
 use crate::film::Tile;
 use crate::light::Enclosure;
+use crate::math::DVec3;
 use crate::scene::{PhotonSettings, Scene, SpatialHistory};
 use crate::simd::Level;
 use crate::transfer::HistoryGroups;
@@ -165,12 +166,13 @@ impl PhotonMapping {
         level.run(Refine { view, segments, tile, groups, cells, places: &self.places, stop })
     }
 
-    /// Step of a view ray, world units: short enough that little light is lost in the densest matter within one, since light
-    /// and view then change as fast.
+    /// Step of a view ray, world units: so short that little light is lost in the densest matter within one, since light and
+    /// view then change as fast; but not without end.
     fn step(&self, scene: &Scene) -> f32 {
         const THICKEST: f32 = 0.5;
+        const SHORTEST: f32 = 1.0 / 16.0;
         let usual = scene.medium.volume().grid().voxel_size() / self.settings.steps_per_voxel;
-        usual.min(THICKEST / scene.medium.density())
+        usual.min((THICKEST / scene.medium.density()).max(SHORTEST * usual))
     }
 
     /// Paths, and of these the ones traced since the last edit.
@@ -226,8 +228,14 @@ impl Paths {
 /// Sorts the photons of all lights; `radius` in voxels.
 fn sorted(scene: &Scene, radius: f32, settings: &PhotonSettings, lights: &[LightPaths]) -> PhotonMap {
     let grid = scene.medium.volume().grid();
-    let cells = CellGrid::new(grid, radius * grid.voxel_size());
+    let radius = radius * grid.voxel_size();
+    // In double precision, since world units may be anything.
+    let per_volume = f64::from(radius).powi(3).recip() / f64::from(scene.medium.density());
+    let scale = |light: &LightPaths| {
+        let [r, g, b] = light.color().to_array().map(f64::from);
+        DVec3::new(r, g, b) * (per_volume / f64::from(light.count))
+    };
     let lit: Vec<Lit> =
-        lights.iter().map(|light| Lit { chunks: &light.chunks, scale: light.scale() }).collect();
-    PhotonMap::new(cells, settings.estimate, &lit)
+        lights.iter().map(|light| Lit { chunks: &light.chunks, scale: scale(light) }).collect();
+    PhotonMap::new(CellGrid::new(grid, radius), radius, settings.estimate, &lit)
 }
