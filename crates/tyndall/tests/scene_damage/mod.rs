@@ -62,6 +62,19 @@ pub fn seeds() -> &'static [Value] {
                 "film": { "background": "transparent" },
                 "render": { "samples": 2 }
             }),
+            json!({
+                "volume": { "procedural": { "kind": "marschner-lobb", "size": [5, 4, 6] } },
+                "transfer_function": { "points": [
+                    { "value": 0.2, "opacity": 0.0, "albedo": 0.5 },
+                    { "value": 0.7, "opacity": 0.9, "surface": 0.6, "emission": [0.0, 0.5, 0.0] } ] },
+                "medium": { "density": 0.5, "brdf": { "type": "ashikhmin-shirley" } },
+                "lights": [
+                    { "name": "lamp", "type": "point", "position": [0.0, 9.0, 0.0], "intensity": 50.0 },
+                    { "type": "environment", "radiance": 0.5 } ],
+                "render": { "integrator": "photon", "max_scatter": 3, "samples": 2, "photon": {
+                    "photons": 100, "radius": 1.5, "segments": 3, "steps_per_voxel": 2.0, "estimate": "nearest",
+                    "nearest": 4, "histories": "paths", "history_bits": 32, "bins": "uniform", "spatial": "axes" } }
+            }),
         ]
     });
     &SEEDS
