@@ -14,6 +14,7 @@ mod emit;
 mod furnace;
 mod levels;
 mod lights;
+mod photon;
 mod scenes;
 mod semi_infinite;
 mod single_scattering;

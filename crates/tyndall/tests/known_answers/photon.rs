@@ -1,0 +1,369 @@
+//! Photon mapping against closed forms, and against `path`, which has no bias.
+//!
+//! Gathering blurs: in matter that changes little within the radius, and is thin across it, by less than a percent. Pixels
+//! share their photons, so what is certain of a picture is told by pictures of other seeds, never by its own variance.
+
+use crate::scenes::{Setup, blocks, henyey_greenstein, matter, volume};
+use std::f64::consts::PI;
+use std::sync::{Arc, LazyLock};
+use tyndall::camera::{Camera, Lens};
+use tyndall::film::Image;
+use tyndall::light::{Directional, Disk, Environment, Light, Map, PointLight, Rect, SphereLight};
+use tyndall::math::{Rgb, Vec3};
+use tyndall::medium::ClipShape;
+use tyndall::scattering::{Abc, Brdf};
+use tyndall::scene::{Background, IntegratorKind, PhotonSettings, Scene, SpatialHistory};
+use tyndall::session::{Budget, Session};
+use tyndall::transfer::{Grouping, Optics, Point};
+use tyndall::volume::{Grid, Space, ValueMap, Volume, Voxels};
+use tyndall_testing::Mean;
+
+/// Pictures of each estimate.
+const SEEDS: u64 = 8;
+/// Pixels along an edge of the picture, and of the blocks that are compared.
+const PIXELS: usize = 32;
+const BLOCK: usize = 8;
+/// Samples of each pixel of a `path` picture.
+const SAMPLES: u32 = 64;
+/// Share by which blur may change the mean of a picture; blocks, which it mixes, twice as much in the mean square.
+const BIAS: f64 = 0.01;
+
+const PHOTONS: PhotonSettings = PhotonSettings {
+    photons: 200_000,
+    radius: 1.0,
+    segments: 7,
+    steps_per_voxel: 2.0,
+    history_bits: 64,
+    bins: Grouping::Quantile,
+    spatial: SpatialHistory::Cells,
+};
+
+/// A picture's mean and those of its blocks, each the mean over seeds; the channels follow each other.
+struct Estimate {
+    whole: Vec<Mean>,
+    blocks: Vec<Mean>,
+}
+
+/// Mean of the squares of blocks of pixels of that edge, by block and channel.
+fn block_means(image: &Image, edge: usize) -> Vec<f64> {
+    let row = PIXELS / edge;
+    let mut means = vec![0.0; 3 * row * row];
+    for (i, pixel) in image.rgba.iter().enumerate() {
+        let block = i / PIXELS / edge * row + i % PIXELS / edge;
+        for channel in 0..3 {
+            means[3 * block + channel] += f64::from(pixel[channel]) / (edge * edge) as f64;
+        }
+    }
+    means
+}
+
+fn estimate(scene: &Scene, integrator: IntegratorKind, samples: u32) -> Estimate {
+    static POOL: LazyLock<Arc<rayon::ThreadPool>> =
+        LazyLock::new(|| Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap()));
+    let mut estimate = Estimate {
+        whole: vec![Mean::default(); 3],
+        blocks: vec![Mean::default(); 3 * (PIXELS / BLOCK).pow(2)],
+    };
+    for seed in 1..=SEEDS {
+        let mut scene = scene.clone();
+        (scene.render.integrator, scene.render.seed) = (integrator, seed);
+        let mut session = Session::new(scene, POOL.clone());
+        session.refine(&Budget::samples(samples));
+        let image = session.image();
+        for (means, edge) in [(&mut estimate.whole, PIXELS), (&mut estimate.blocks, BLOCK)] {
+            means.iter_mut().zip(block_means(&image, edge)).for_each(|(mean, x)| mean.push(x));
+        }
+    }
+    estimate
+}
+
+fn photons(scene: &Scene) -> Estimate {
+    estimate(scene, IntegratorKind::Photon(PHOTONS), 1)
+}
+
+fn path(scene: &Scene) -> Estimate {
+    estimate(scene, IntegratorKind::Path, SAMPLES)
+}
+
+impl Estimate {
+    /// What is known for certain: a value of every block, the same in all channels.
+    fn exactly(blocks: impl Fn([usize; 2]) -> [f64; 3]) -> Self {
+        let row = PIXELS / BLOCK;
+        let values: Vec<f64> = (0..row * row).flat_map(|i| blocks([i % row, i / row])).collect();
+        let certain = |x: f64| Mean::from_iter([x, x]);
+        let whole = |channel: usize| {
+            certain(values.iter().skip(channel).step_by(3).sum::<f64>() / (row * row) as f64)
+        };
+        Self { whole: [0, 1, 2].map(whole).to_vec(), blocks: values.into_iter().map(certain).collect() }
+    }
+
+    /// Root of the mean square by which blocks of a channel are off beside noise, over the channel's mean.
+    fn blocks_off(&self, expected: &Self, channel: usize) -> f64 {
+        let pairs = || self.blocks.iter().zip(&expected.blocks).skip(channel).step_by(3);
+        let square = |(a, b): (&Mean, &Mean)| {
+            (a.mean() - b.mean()).powi(2) - a.variance_of_mean() - b.variance_of_mean()
+        };
+        let mean = pairs().map(square).sum::<f64>() / pairs().count() as f64;
+        mean.max(0.0).sqrt() / expected.whole[channel].mean()
+    }
+
+    /// Sharp, and off by no more than so large a share.
+    #[track_caller]
+    fn assert_near(&self, expected: &Self, bias: f64, name: &str) {
+        for channel in 0..3 {
+            let (a, b) = (&self.whole[channel], &expected.whole[channel]);
+            if b.mean() == 0.0 {
+                assert_eq!(a.mean(), 0.0, "{name}, channel {channel} is black");
+                continue;
+            }
+            let error = (a.variance_of_mean() + b.variance_of_mean()).sqrt() / b.mean();
+            let (off, blocks_off) = (a.mean() / b.mean() - 1.0, self.blocks_off(expected, channel));
+            println!(
+                "{name} {channel}: off {off:+.4} +- {error:.4}, blocks {blocks_off:.4}, mean {:.4}",
+                b.mean()
+            );
+            assert!(error < 0.4 * bias, "{name}, channel {channel}: noise {error}");
+            assert!(off.abs() < bias + 3.0 * error, "{name}, channel {channel}: off by {off} +- {error}");
+            assert!(blocks_off < 2.0 * bias, "{name}, channel {channel}: blocks off by {blocks_off}");
+        }
+    }
+}
+
+/// A cloud in [-1, 1]^3, without edges.
+fn cloud(p: [f32; 3]) -> f32 {
+    (-2.5 * (Vec3::from_array(p) - Vec3::new(0.1, -0.05, 0.15)).length_squared()).exp()
+}
+
+/// The value of a voxel by its place in [-1, 1]^3.
+fn at<const N: usize>(value: impl Fn([f32; 3]) -> f32) -> impl Fn([usize; 3]) -> f32 {
+    move |p| value(p.map(|i| (i as f32 + 0.5) / N as f32 * 2.0 - 1.0))
+}
+
+/// Opacity rises with the value from nothing at 0 to all at 1.
+fn ramp(optics: Optics) -> Vec<Point> {
+    let clear = Point { value: 0.0, optics: Optics { opacity: 0.0, ..optics } };
+    vec![clear, Point { value: 1.0, optics }]
+}
+
+fn sun() -> Light {
+    Light::Directional(Directional::new(Vec3::new(0.3, 0.5, -1.0), Rgb::WHITE, 0.0))
+}
+
+/// The cloud in sunlight, of some albedo.
+fn sunny(albedo: f32) -> Setup {
+    let optics = Optics { albedo: Rgb::splat(albedo), ..Optics::default() };
+    let volume = volume([32; 3], [2.0; 3], at::<32>(cloud));
+    Setup { lights: vec![sun()], max_scatter: 20, ..Setup::new(volume, ramp(optics), 2.0) }
+}
+
+/// Seen by a parallel view towards a place.
+fn seen(setup: Setup, from: Vec3, to: Vec3, height: f32) -> Scene {
+    let mut scene = setup.scene();
+    scene.camera = Camera::new(from, to, Vec3::Z, Lens::Orthographic { height });
+    scene.size = [u32::try_from(PIXELS).unwrap(); 2];
+    scene
+}
+
+const ASIDE: Vec3 = Vec3::new(2.0, -4.0, 1.0);
+
+#[track_caller]
+fn assert_as_path(name: &str, scene: &Scene) {
+    photons(scene).assert_near(&path(scene), BIAS, name);
+}
+
+/// A cube under a sun that shines straight down, seen along y: `albedo p E exp(-sigma (1 - z)) (1 - exp(-2 sigma))`; and
+/// from nearly above.
+#[test]
+fn single_scattering_in_a_cube() {
+    let sigma = 0.8_f64;
+    let albedo = Rgb::new(0.5, 1.0, 0.2);
+    for g in [0.0, 0.6, -0.5] {
+        let mut points = matter(0.0);
+        points[0].optics.albedo = albedo;
+        let setup = || Setup {
+            phase: henyey_greenstein(g),
+            lights: vec![Light::Directional(Directional::new(-Vec3::Z, Rgb::WHITE, 0.0))],
+            max_scatter: 1,
+            ..Setup::new(volume([32; 3], [2.0; 3], |_| 0.0), points.clone(), sigma as f32)
+        };
+        let g = f64::from(g);
+        let phase = |cos: f64| (1.0 - g * g) / (4.0 * PI * (1.0 + g * g - 2.0 * g * cos).powf(1.5));
+        let colored = |x: f64| albedo.to_array().map(|a| f64::from(a) * x);
+        // The middle of the cube, in rows of blocks from the top.
+        let aside = seen(setup(), -Vec3::Y * 5.0, Vec3::ZERO, 1.2);
+        let edge = |row: usize| 0.6 - 1.2 * (row * BLOCK) as f64 / PIXELS as f64;
+        let light = |[_, row]: [usize; 2]| {
+            let through = |z: f64| (-sigma * (1.0 - z)).exp() / sigma;
+            let mean = (through(edge(row)) - through(edge(row + 1))) / (edge(row) - edge(row + 1));
+            colored(phase(0.0) * mean * (1.0 - (-2.0 * sigma).exp()))
+        };
+        photons(&aside).assert_near(&Estimate::exactly(light), BIAS, &format!("aside, g = {g}"));
+        let mut above = seen(setup(), Vec3::X * 5.0, Vec3::ZERO, 1.2);
+        above.camera = Camera::new(Vec3::Z * 5.0, Vec3::ZERO, Vec3::Y, Lens::Orthographic { height: 1.2 });
+        let back = phase(-1.0) * (1.0 - (-4.0 * sigma).exp()) / 2.0;
+        photons(&above).assert_near(&Estimate::exactly(|_| colored(back)), BIAS, &format!("above, g = {g}"));
+    }
+}
+
+/// With albedo 1 under an even sky all is as bright as the sky.
+#[test]
+fn white_furnace() {
+    let lumps =
+        |p: [f32; 3]| 0.5 + 0.5 * (p[0] * 4.0).sin() * (p[1] * 5.0 + 1.0).sin() * (p[2] * 4.0 + 0.5).sin();
+    for (name, g, density) in
+        [("isotropic", 0.0, 2.0), ("forward", 0.6, 3.0), ("backward", -0.5, 2.0), ("thick", 0.0, 5.0)]
+    {
+        let white = Optics { albedo: Rgb::WHITE, ..Optics::default() };
+        let setup = Setup {
+            phase: henyey_greenstein(g),
+            lights: vec![Light::Environment(Environment::constant(Rgb::WHITE, true))],
+            max_scatter: 1000,
+            ..Setup::new(volume([32; 3], [2.0; 3], at::<32>(lumps)), ramp(white), density)
+        };
+        let scene = seen(setup, ASIDE, Vec3::ZERO, 2.0);
+        photons(&scene).assert_near(&Estimate::exactly(|_| [1.0; 3]), BIAS, name);
+    }
+}
+
+/// Light goes from surface to surface with the cosine of the side that it comes from.
+#[test]
+fn surfaces() {
+    let abc = Brdf::Abc(Abc::new(20.0, 1.2).unwrap());
+    for (name, brdf) in [("lambert", Brdf::Lambert), ("glossy", Brdf::AshikhminShirley), ("abc", abc)] {
+        let optics = Optics {
+            albedo: Rgb::splat(0.9),
+            surface: 1.0,
+            specular: Rgb::splat(0.5),
+            roughness: 0.6,
+            ..Optics::default()
+        };
+        let setup = Setup { brdf, max_scatter: 2, points: ramp(optics), ..sunny(0.9) };
+        assert_as_path(name, &seen(setup, ASIDE, Vec3::ZERO, 1.6));
+    }
+}
+
+#[test]
+fn lights_of_every_kind() {
+    let away = Vec3::new(1.2, -0.9, 1.5);
+    let white = Rgb::WHITE;
+    let texel =
+        |i: usize| if i % 32 < 8 { Rgb::new(3.0, 1.0, 0.2) } else { Rgb::splat((i / 64) as f32 * 0.1) };
+    let map = Arc::new(Map::new(32, 16, (0..32 * 16).map(texel).collect()).unwrap());
+    let sky = |environment| Light::Environment(environment);
+    let lights = [
+        ("sun", sun()),
+        ("wide sun", Light::Directional(Directional::new(-away, white, 40.0))),
+        ("point", Light::Point(PointLight { position: away, intensity: white })),
+        ("point inside", Light::Point(PointLight { position: Vec3::new(0.5, -0.6, 0.6), intensity: white })),
+        ("rect", Light::Rect(Rect::new(away, -away, Vec3::Z, [1.0, 0.5], white))),
+        ("rect inside", Light::Rect(Rect::new(Vec3::Z * 0.9, -Vec3::Z, Vec3::X, [1.0, 0.5], white))),
+        ("disk", Light::Disk(Disk::new(away, Vec3::new(-1.0, 0.2, -1.0), 0.6, white))),
+        ("sphere", Light::Sphere(SphereLight { middle: away, radius: 0.5, radiance: white })),
+        ("sky", sky(Environment::constant(white, false))),
+        ("map", sky(Environment::map(map, Vec3::Z, 30.0, true))),
+    ];
+    for (name, light) in lights {
+        assert_as_path(name, &seen(Setup { lights: vec![light], ..sunny(0.7) }, ASIDE, Vec3::ZERO, 1.6));
+    }
+}
+
+/// A channel that the light or the matter lacks takes nothing from the others, and lights add up.
+#[test]
+fn black_channels_and_several_lights() {
+    let green = Optics { albedo: Rgb::new(0.0, 1.0, 0.6), ..Optics::default() };
+    let red = Directional::new(Vec3::new(0.3, 0.5, -1.0), Rgb::new(1.0, 0.5, 0.0), 0.0);
+    let lights = vec![
+        Light::Directional(red),
+        Light::Environment(Environment::constant(Rgb::new(0.0, 0.1, 0.3), false)),
+    ];
+    let setup = Setup { lights: lights[..1].to_vec(), points: ramp(green), ..sunny(0.0) };
+    assert_as_path("one light", &seen(setup, ASIDE, Vec3::ZERO, 1.6));
+    let setup = Setup { lights, points: ramp(green), ..sunny(0.0) };
+    assert_as_path("two lights", &seen(setup, ASIDE, Vec3::ZERO, 1.6));
+}
+
+/// Each path has its share of the light, also one that misses: so many paths more change no mean.
+#[test]
+fn the_number_of_photons_is_no_brightness() {
+    let setup = Setup { density: 0.3, ..sunny(0.9) };
+    let scene = seen(setup, ASIDE, Vec3::ZERO, 1.6);
+    let with = |photons| estimate(&scene, IntegratorKind::Photon(PhotonSettings { photons, ..PHOTONS }), 1);
+    // No power of two, and far from whole blocks of numbers that are stratified together.
+    with(70_001).assert_near(&with(700_000), BIAS, "photons");
+}
+
+/// A glowing ball lights a layer below it; the picture shows the layer alone.
+#[test]
+fn glowing_matter_lights_other_matter() {
+    let value = |p: [f32; 3]| {
+        let [ball, layer] = [(Vec3::from_array(p) - Vec3::Z * 0.5).length() / 0.45, (p[2] + 0.6) / 0.4];
+        let bump = |x: f32| (1.0 - x * x).max(0.0).powi(2);
+        bump(ball) - bump(layer)
+    };
+    let dark = Optics { albedo: Rgb::new(0.8, 0.8, 0.5), ..Optics::default() };
+    let glow = Optics { albedo: Rgb::BLACK, emission: Rgb::new(3.0, 1.0, 0.0), ..Optics::default() };
+    let clear = |optics| Optics { opacity: 0.0, ..optics };
+    let points = [(-1.0, dark), (0.0, clear(dark)), (0.0, clear(glow)), (1.0, glow)];
+    let points = points.map(|(value, optics)| Point { value, optics }).to_vec();
+    let setup =
+        Setup { max_scatter: 20, ..Setup::new(volume([32; 3], [2.0; 3], at::<32>(value)), points, 2.0) };
+    assert_as_path("glow", &seen(setup, Vec3::new(0.0, -5.0, -0.6), -Vec3::Z * 0.6, 0.7));
+}
+
+/// Voxels of unlike edges, turned, sheared and left-handed.
+#[test]
+fn grids_of_any_shape() {
+    let (s, c) = (0.6, 0.8);
+    let direction = [[c, -s, 0.28], [s, c, 0.0], [0.0, 0.0, -0.96]];
+    let (dims, spacing) = ([40, 32, 20], [0.05, 0.0625, 0.1]);
+    let values: Vec<f32> = (0..dims.iter().product())
+        .map(|i| [i % 40, i / 40 % 32, i / (40 * 32)])
+        .map(|p| cloud([0, 1, 2].map(|a| (p[a] as f32 + 0.5) / dims[a] as f32 * 2.0 - 1.0)))
+        .collect();
+    let half = [0, 1, 2].map(|a| 0.5 * (dims[a] as f64 - 1.0) * spacing[a]);
+    let origin = direction.map(|row| -(0..3).map(|a| row[a] * half[a]).sum::<f64>());
+    let grid = Grid::new(dims, spacing, direction, origin, Space::Plain).unwrap();
+    let volume = Volume::new(grid, Voxels::F32(values), ValueMap::IDENTITY).unwrap();
+    let optics = Optics { surface: 0.5, ..Optics::default() };
+    let setup = Setup { volume, points: ramp(optics), phase: henyey_greenstein(0.4), ..sunny(0.0) };
+    assert_as_path("sheared", &seen(setup, ASIDE, Vec3::ZERO, 1.6));
+}
+
+/// The camera amid the matter, in front of a background that lights nothing.
+#[test]
+fn a_camera_inside() {
+    let mut scene = seen(sunny(0.8), ASIDE, Vec3::ZERO, 1.6);
+    let lens = Lens::Perspective { fov: 80.0, aperture: 0.0, focus: 1.0 };
+    scene.camera = Camera::new(Vec3::new(0.2, -0.3, 0.0), Vec3::new(0.0, 1.0, 0.2), Vec3::Z, lens);
+    scene.background = Background::Color(Rgb::new(0.02, 0.0, 0.05));
+    assert_as_path("inside", &scene);
+}
+
+/// Nothing lies, and no light goes lost, behind a cut.
+#[test]
+fn a_cut_cloud() {
+    let clip = vec![ClipShape::Plane { point: Vec3::ZERO, normal: Vec3::new(0.5, -1.0, 0.8) }];
+    assert_as_path("cut", &seen(Setup { clip, ..sunny(0.8) }, ASIDE, Vec3::ZERO, 1.6));
+}
+
+#[test]
+fn voxels_without_interpolation() {
+    let volume = blocks([32; 3], [2.0; 3], at::<32>(cloud));
+    assert_as_path("blocks", &seen(Setup { volume, ..sunny(0.8) }, ASIDE, Vec3::ZERO, 1.6));
+}
+
+/// Later passes gather more narrowly, by photons of their own: blur and noise both decrease.
+#[test]
+fn refinement_converges() {
+    const PASSES: u32 = 20;
+    let scene = seen(sunny(0.8), ASIDE, Vec3::ZERO, 1.6);
+    let settings = PhotonSettings { photons: 30_000, radius: 6.0, ..PHOTONS };
+    let after = |passes| estimate(&scene, IntegratorKind::Photon(settings), passes);
+    let (exact, first, last) = (path(&scene), after(1), after(PASSES));
+    let noise = |of: &Estimate| of.blocks.iter().map(Mean::variance_of_mean).sum::<f64>();
+    let off = [first.blocks_off(&exact, 1), last.blocks_off(&exact, 1)];
+    println!("off {off:?} noise {} {}", noise(&first), noise(&last));
+    assert!(off[0] > 0.02 && off[1] < 0.7 * off[0], "blocks off by {off:?}");
+    assert!(noise(&last) < noise(&first) / 8.0, "noise {} after {}", noise(&last), noise(&first));
+    last.assert_near(&exact, 2.0 * BIAS, "refined");
+}
