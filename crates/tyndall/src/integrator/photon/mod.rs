@@ -176,11 +176,11 @@ impl PhotonMapping {
         self.lights.iter().flat_map(|light| &light.chunks).map(|chunk| chunk.photons().len()).sum()
     }
 
-    /// Bytes kept for paths, photons and their histories.
+    /// Bytes kept for paths, photons and their histories, and for the base map that sorts the photons.
     #[must_use]
-    pub fn bytes(&self) -> usize {
+    pub fn bytes(&self) -> [usize; 2] {
         let chunks = self.lights.iter().flat_map(|light| &light.chunks);
-        chunks.map(chunk::Chunk::bytes).sum::<usize>() + self.map.as_ref().map_or(0, PhotonMap::bytes)
+        [chunks.map(chunk::Chunk::bytes).sum(), self.map.as_ref().map_or(0, PhotonMap::bytes)]
     }
 }
 
