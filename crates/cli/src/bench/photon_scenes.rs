@@ -18,7 +18,7 @@ fn point(value: f64, opacity: f64, albedo: [f64; 3]) -> Value {
 }
 
 /// The volume's side in voxels: that of the paper's Cornell box, or what shows that it works.
-fn side(effort: &Effort) -> u32 {
+pub fn side(effort: &Effort) -> u32 {
     effort.pick(256, 64)
 }
 
