@@ -211,6 +211,8 @@ pub struct BenchOptions {
 pub enum BenchName {
     /// What the path tracer and the ray marcher stand on
     Core,
+    /// Photon mapping that survives edits, beside the tables of its paper
+    Historygrams,
     /// All there are
     All,
 }

@@ -127,6 +127,27 @@ impl Session {
         }
     }
 
+    /// What is kept for edits to come: of each kind how many there are, and the bytes of all together. A photon mapper keeps
+    /// light `paths`, their `photons`, the `map` that sorts these, and `segments`; other methods keep nothing.
+    #[must_use]
+    pub fn kept(&self) -> Vec<(&'static str, [usize; 2])> {
+        match &self.integrator {
+            Integrator::RayMarch(_) | Integrator::Path(_) => Vec::new(),
+            Integrator::Photon(photon) => {
+                let ([of_paths, of_photons, map], photons) = (photon.bytes(), photon.photons());
+                let paths = [photon.paths()[0], of_paths];
+                let segments = self.tiles.iter().map(|tile| [tile.segments()[0], tile.bytes()]);
+                let segments = segments.fold([0; 2], |[a, b], [c, d]| [a + c, b + d]);
+                vec![
+                    ("paths", paths),
+                    ("photons", [photons, of_photons]),
+                    ("map", [photons, map]),
+                    ("segments", segments),
+                ]
+            }
+        }
+    }
+
     /// Threads that work.
     #[must_use]
     pub fn threads(&self) -> usize {

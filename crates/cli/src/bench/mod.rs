@@ -1,7 +1,11 @@
 //! `tyndall bench`: tables of what this machine does, as ratios measured by turns in one run wherever there is a rival.
 
 mod core;
+mod edit;
 mod growth;
+mod historygram_figures;
+mod historygrams;
+mod photon_scenes;
 mod scenes;
 mod timing;
 
@@ -23,6 +27,8 @@ pub struct Row {
     pub ours: f64,
     /// At least (positive) or at most (negative) this much is aimed at.
     pub floor: Option<f64>,
+    /// What the paper found that the table is from, on its machine and data.
+    pub paper: Option<f64>,
 }
 
 impl Row {
@@ -34,7 +40,7 @@ impl Row {
         unit: &'static str,
         ours: f64,
     ) -> Self {
-        Self { table, row: row.into(), quantity, unit, ours, floor: None }
+        Self { table, row: row.into(), quantity, unit, ours, floor: None, paper: None }
     }
 
     /// Asked to be at least so much.
@@ -49,6 +55,12 @@ impl Row {
         self
     }
 
+    /// With what the paper found.
+    pub fn beside(mut self, paper: Option<f64>) -> Self {
+        self.paper = paper;
+        self
+    }
+
     fn target(&self) -> String {
         match self.floor {
             None => String::new(),
@@ -60,28 +72,44 @@ impl Row {
     fn json(&self, reduced: bool) -> Value {
         json!({
             "table": self.table, "row": self.row, "quantity": self.quantity, "unit": self.unit,
-            // The core has no paper whose figures would stand beside these.
-            "paper": null, "ours": self.ours, "reduced": reduced, "extrapolated": false, "target": self.target(),
+            "paper": self.paper, "ours": self.ours, "reduced": reduced, "extrapolated": false, "target": self.target(),
         })
     }
 
     fn line(&self) -> String {
         let Self { row, quantity, unit, ours, .. } = self;
-        format!("{row:<44} {quantity:<34} {ours:>10.3} {unit:<8} {}\n", self.target())
+        let paper = self.paper.map_or(String::new(), |paper| format!("paper {paper}"));
+        let line = format!("{row:<44} {quantity:<34} {ours:>10.3} {unit:<8} {:<10} {paper}", self.target());
+        line.trim_end().to_owned() + "\n"
     }
 }
 
 /// Measures the rows of one table with certain vector instructions.
 type Table = fn(&timing::Effort, tyndall::simd::Level) -> Result<Vec<Row>, Failure>;
 
+const CORE: &[Table] =
+    &[core::sampling, core::flight, core::paths, core::threads, core::latency, growth::curves];
+
+const HISTORYGRAMS: &[Table] = &[
+    historygrams::cornell_box,
+    historygrams::ct,
+    historygrams::hard,
+    historygram_figures::figure_7,
+    historygram_figures::figure_8,
+    historygram_figures::figure_9,
+    historygram_figures::defaults,
+];
+
 /// Runs the tables and prints each as soon as it is there, or all as JSON.
 pub fn run(options: &BenchOptions) -> Result<(), Failure> {
-    let (BenchName::Core | BenchName::All) = options.name;
     let level = crate::machine::vector_instructions()?;
     let effort = timing::Effort::new(options.quick);
     let mut all = Vec::new();
-    let tables: [Table; 6] =
-        [core::sampling, core::flight, core::paths, core::threads, core::latency, growth::curves];
+    let tables = match options.name {
+        BenchName::Core => CORE.to_vec(),
+        BenchName::Historygrams => HISTORYGRAMS.to_vec(),
+        BenchName::All => [CORE, HISTORYGRAMS].concat(),
+    };
     for table in tables {
         let rows = table(&effort, level)?;
         if !options.json {

@@ -42,7 +42,8 @@ impl Effort {
     }
 }
 
-fn median(mut times: Vec<f64>) -> f64 {
+/// The middle one of several.
+pub fn median(mut times: Vec<f64>) -> f64 {
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]
 }

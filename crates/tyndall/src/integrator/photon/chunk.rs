@@ -63,10 +63,11 @@ impl Chunk {
         self.changed.add(changed);
     }
 
-    /// Bytes kept.
-    pub fn bytes(&self) -> usize {
+    /// Bytes kept for the paths themselves, and for their interactions.
+    pub fn bytes(&self) -> [usize; 2] {
         let histories = self.flight.bytes() + self.scatter.bytes();
-        size_of_val(&self.paths[..]) + size_of_val(&self.ends[..]) + histories + self.interactions.bytes()
+        let paths = size_of_val(&self.paths[..]) + size_of_val(&self.ends[..]) + histories;
+        [paths, self.interactions.bytes()]
     }
 
     fn range(&self, path: usize) -> Range<usize> {

@@ -198,11 +198,12 @@ impl PhotonMapping {
         self.lights.iter().flat_map(|light| &light.chunks).map(|chunk| chunk.photons().len()).sum()
     }
 
-    /// Bytes kept for paths, photons and their histories.
+    /// Bytes kept for paths, for photons, both with their histories, and for the base map that sorts the photons.
     #[must_use]
-    pub fn bytes(&self) -> usize {
-        let chunks = self.lights.iter().flat_map(|light| &light.chunks);
-        chunks.map(chunk::Chunk::bytes).sum::<usize>() + self.map.as_ref().map_or(0, PhotonMap::bytes)
+    pub fn bytes(&self) -> [usize; 3] {
+        let chunks = self.lights.iter().flat_map(|light| &light.chunks).map(chunk::Chunk::bytes);
+        let [paths, photons] = chunks.fold([0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        [paths, photons, self.map.as_ref().map_or(0, PhotonMap::bytes)]
     }
 }
 

@@ -1,0 +1,156 @@
+//! What an edit of a photon-mapped scene costs, against the scene from nothing.
+
+use super::scenes::Bench;
+use super::timing::{Effort, median};
+use crate::Failure;
+use serde_json::{Value, json};
+use std::time::Instant;
+use tyndall::scene::document;
+use tyndall::session::{Budget, Session};
+use tyndall::simd::Level;
+
+/// What an edit is held against.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Against {
+    /// Renders from nothing, to whose picture it must come bit for bit.
+    Equal,
+    /// Renders from nothing, to whose picture it need not come.
+    Unequal,
+    /// The first picture of its own session, which is as much work where the edit is of a colour: half the time, no check.
+    First,
+}
+
+/// An edit.
+pub struct Edit<'a> {
+    /// The document.
+    pub bench: &'a Bench,
+    /// The patch that gives the scene before it.
+    pub before: Value,
+    /// The patch that it is.
+    pub patch: Value,
+    pub against: Against,
+    /// Whether a single segment per ray is measured too.
+    pub plain: bool,
+    /// Seconds during which the scene from nothing is rendered again, and a quarter of those during which the edit is played
+    /// again; both are once in any case.
+    pub patience: f64,
+}
+
+/// What it took, as medians.
+pub struct Cost {
+    /// From nothing: seconds for photons, for segments, and from the edited document to the picture.
+    pub scratch: [f64; 3],
+    /// The edit: the same.
+    pub edit: [f64; 3],
+    /// Of photons and segments that a picture from nothing computes, the share that the edit did.
+    pub shares: [f64; 2],
+    /// The whole from nothing with one segment per ray.
+    pub plain: Option<f64>,
+    /// See [`Session::kept`].
+    pub kept: Vec<(&'static str, [usize; 2])>,
+}
+
+impl Edit<'_> {
+    /// Plays the edit against a live session, again and again, by turns with renders from nothing.
+    ///
+    /// # Errors
+    /// Where the live picture is not the one from nothing.
+    pub fn measure(&self, effort: &Effort, level: Level) -> Result<Cost, Failure> {
+        /// Edits after which the median hardly moves.
+        const EDITS: usize = 3;
+        let bench = self.bench;
+        let after = document::apply(&self.before, &self.patch);
+        let one = document::apply(&after, &json!({ "render": { "photon": { "segments": 1 } } }));
+        let (mut scratch, mut edit, mut plain) = (Times::default(), Times::default(), Times::default());
+        let start = Instant::now();
+        let before = bench.scene(&self.before)?;
+        let mut live = bench.render(&before, level, 1);
+        if self.against == Against::First {
+            scratch.add(&live, start);
+        }
+        let (mut picture, mut all, mut kept) = (Vec::new(), computed(&live), live.kept());
+        let mut shares = [0.0; 2];
+        let begun = Instant::now();
+        let patient = |times: f64| begun.elapsed().as_secs_f64() < times * self.patience;
+        for round in 0..effort.rounds.min(EDITS) {
+            if round > 0 {
+                live.set_scene(before.clone());
+                live.refine(&Budget::samples(1));
+            }
+            if self.against != Against::First && (round == 0 || patient(1.0)) {
+                let start = Instant::now();
+                let fresh = bench.render(&bench.scene(&after)?, level, 1);
+                scratch.add(&fresh, start);
+                (picture, all, kept) = (bits(&fresh), computed(&fresh), fresh.kept());
+            }
+            if self.plain && (round == 0 || patient(1.0)) {
+                let start = Instant::now();
+                plain.add(&bench.render(&bench.scene(&one)?, level, 1), start);
+            }
+            let start = Instant::now();
+            live.set_scene(bench.scene(&after)?);
+            live.refine(&Budget::samples(1));
+            edit.add(&live, start);
+            let done = computed(&live);
+            shares = [0, 1].map(|i| if all[i] > 0.0 { done[i] / all[i] } else { 0.0 });
+            if self.against == Against::Equal && bits(&live) != picture {
+                return Err(Failure::input("the picture after the edit is not the one from nothing"));
+            }
+            if !patient(4.0) {
+                break;
+            }
+        }
+        let plain = self.plain.then(|| plain.medians()[2]);
+        Ok(Cost { scratch: scratch.medians(), edit: edit.medians(), shares, plain, kept })
+    }
+}
+
+impl Cost {
+    /// How much sooner the edited picture is there than one from nothing.
+    pub fn speed_up(&self) -> f64 {
+        self.scratch[2] / self.edit[2]
+    }
+
+    /// Seconds that the shares computed would take if they cost their part of the whole.
+    pub fn due(&self) -> f64 {
+        self.shares[0] * self.scratch[0] + self.shares[1] * self.scratch[1]
+    }
+
+    /// The speed-up if nothing cost but these.
+    pub fn bound(&self) -> f64 {
+        (self.scratch[0] + self.scratch[1]) / self.due().max(1e-9)
+    }
+}
+
+/// Seconds of the stages and of the whole, run by run.
+#[derive(Default)]
+struct Times([Vec<f64>; 3]);
+
+impl Times {
+    fn add(&mut self, session: &Session, start: Instant) {
+        let total = start.elapsed().as_secs_f64();
+        let [photons, segments] = stages(&session.spent());
+        for (times, time) in self.0.iter_mut().zip([photons, segments, total]) {
+            times.push(time);
+        }
+    }
+
+    fn medians(self) -> [f64; 3] {
+        self.0.map(median)
+    }
+}
+
+fn stages(of_session: &[(&'static str, f64)]) -> [f64; 2] {
+    ["photons", "segments"]
+        .map(|stage| of_session.iter().find(|(name, _)| *name == stage).map_or(0.0, |(_, x)| *x))
+}
+
+fn computed(session: &Session) -> [f64; 2] {
+    stages(&session.recomputed())
+}
+
+/// The picture, to be compared bit by bit.
+fn bits(session: &Session) -> Vec<u32> {
+    let image = session.image();
+    image.rgba.as_flattened().iter().chain(&image.depth).map(|x| x.to_bits()).collect()
+}
