@@ -167,7 +167,7 @@ impl<'a> Live<'a> {
             Before {
                 samples: self.session.film().samples(),
                 image: self.session.image(),
-                kept: self.session.kept(),
+                kept: self.session.snapshot(),
             }
         });
 
@@ -207,7 +207,7 @@ impl<'a> Live<'a> {
         refine(&mut fresh, 1, self.interrupt);
         let scratch_s = begun.elapsed().as_secs_f64();
 
-        let of_items = self.session.kept().zip(self.session.computed()).zip(fresh.kept());
+        let of_items = self.session.snapshot().zip(self.session.computed()).zip(fresh.snapshot());
 
         // Pictures are equal at equal numbers of samples, of which a kept one may have more than were asked for.
         let samples = document.render.samples.max(self.session.film().samples());

@@ -112,7 +112,7 @@ impl Session {
 
     /// A copy of what the session keeps through edits beside pixels, for checks.
     #[must_use]
-    pub fn kept(&self) -> Option<Kept> {
+    pub fn snapshot(&self) -> Option<Kept> {
         Kept::of(&self.integrator, &self.tiles)
     }
 

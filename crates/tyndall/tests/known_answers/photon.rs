@@ -12,7 +12,7 @@ use tyndall::light::{Directional, Disk, Environment, Light, Map, PointLight, Rec
 use tyndall::math::{Rgb, Vec3};
 use tyndall::medium::ClipShape;
 use tyndall::scattering::{Abc, Brdf};
-use tyndall::scene::{Background, IntegratorKind, PhotonSettings, Scene, SpatialHistory};
+use tyndall::scene::{self, Background, IntegratorKind, PhotonSettings, Scene, SpatialHistory};
 use tyndall::session::{Budget, Session};
 use tyndall::transfer::{Grouping, Optics, Point};
 use tyndall::volume::{Grid, Space, ValueMap, Volume, Voxels};
@@ -24,7 +24,7 @@ const SEEDS: u64 = 8;
 const PIXELS: usize = 32;
 const BLOCK: usize = 8;
 /// Samples of each pixel of a `path` picture.
-const SAMPLES: u32 = 64;
+const SAMPLES: u32 = 32;
 /// Share by which blur may change the mean of a picture; blocks, which it mixes, twice as much in the mean square.
 const BIAS: f64 = 0.01;
 
@@ -33,6 +33,8 @@ const PHOTONS: PhotonSettings = PhotonSettings {
     radius: 1.0,
     segments: 7,
     steps_per_voxel: 2.0,
+    estimate: scene::Estimate::Point,
+    histories: scene::Histories::Interactions,
     history_bits: 64,
     bins: Grouping::Quantile,
     spatial: SpatialHistory::Cells,
@@ -44,7 +46,7 @@ struct Estimate {
     blocks: Vec<Mean>,
 }
 
-/// Mean of the squares of blocks of pixels of that edge, by block and channel.
+/// Means of square blocks of pixels of an edge; the channels follow each other.
 fn block_means(image: &Image, edge: usize) -> Vec<f64> {
     let row = PIXELS / edge;
     let mut means = vec![0.0; 3 * row * row];
@@ -77,8 +79,8 @@ fn estimate(scene: &Scene, integrator: IntegratorKind, samples: u32) -> Estimate
     estimate
 }
 
-fn photons(scene: &Scene) -> Estimate {
-    estimate(scene, IntegratorKind::Photon(PHOTONS), 1)
+fn photons(scene: &Scene, settings: PhotonSettings) -> Estimate {
+    estimate(scene, IntegratorKind::Photon(settings), 1)
 }
 
 fn path(scene: &Scene) -> Estimate {
@@ -86,7 +88,7 @@ fn path(scene: &Scene) -> Estimate {
 }
 
 impl Estimate {
-    /// What is known for certain: a value of every block, the same in all channels.
+    /// What is known for certain, of every block by its column and row.
     fn exactly(blocks: impl Fn([usize; 2]) -> [f64; 3]) -> Self {
         let row = PIXELS / BLOCK;
         let values: Vec<f64> = (0..row * row).flat_map(|i| blocks([i % row, i / row])).collect();
@@ -118,11 +120,7 @@ impl Estimate {
             }
             let error = (a.variance_of_mean() + b.variance_of_mean()).sqrt() / b.mean();
             let (off, blocks_off) = (a.mean() / b.mean() - 1.0, self.blocks_off(expected, channel));
-            println!(
-                "{name} {channel}: off {off:+.4} +- {error:.4}, blocks {blocks_off:.4}, mean {:.4}",
-                b.mean()
-            );
-            assert!(error < 0.4 * bias, "{name}, channel {channel}: noise {error}");
+            assert!(error < 0.5 * bias, "{name}, channel {channel}: noise {error}");
             assert!(off.abs() < bias + 3.0 * error, "{name}, channel {channel}: off by {off} +- {error}");
             assert!(blocks_off < 2.0 * bias, "{name}, channel {channel}: blocks off by {blocks_off}");
         }
@@ -134,9 +132,9 @@ fn cloud(p: [f32; 3]) -> f32 {
     (-2.5 * (Vec3::from_array(p) - Vec3::new(0.1, -0.05, 0.15)).length_squared()).exp()
 }
 
-/// The value of a voxel by its place in [-1, 1]^3.
-fn at<const N: usize>(value: impl Fn([f32; 3]) -> f32) -> impl Fn([usize; 3]) -> f32 {
-    move |p| value(p.map(|i| (i as f32 + 0.5) / N as f32 * 2.0 - 1.0))
+/// The value of a voxel, one of 32 along each axis, by its place in [-1, 1]^3.
+fn of_32(value: impl Fn([f32; 3]) -> f32) -> impl Fn([usize; 3]) -> f32 {
+    move |p| value(p.map(|i| (i as f32 + 0.5) / 16.0 - 1.0))
 }
 
 /// Opacity rises with the value from nothing at 0 to all at 1.
@@ -152,7 +150,7 @@ fn sun() -> Light {
 /// The cloud in sunlight, of some albedo.
 fn sunny(albedo: f32) -> Setup {
     let optics = Optics { albedo: Rgb::splat(albedo), ..Optics::default() };
-    let volume = volume([32; 3], [2.0; 3], at::<32>(cloud));
+    let volume = volume([32; 3], [2.0; 3], of_32(cloud));
     Setup { lights: vec![sun()], max_scatter: 20, ..Setup::new(volume, ramp(optics), 2.0) }
 }
 
@@ -168,13 +166,20 @@ const ASIDE: Vec3 = Vec3::new(2.0, -4.0, 1.0);
 
 #[track_caller]
 fn assert_as_path(name: &str, scene: &Scene) {
-    photons(scene).assert_near(&path(scene), BIAS, name);
+    assert_as_path_with(PHOTONS, name, scene);
+}
+
+#[track_caller]
+fn assert_as_path_with(settings: PhotonSettings, name: &str, scene: &Scene) {
+    photons(scene, settings).assert_near(&path(scene), BIAS, name);
 }
 
 /// A cube under a sun that shines straight down, seen along y: `albedo p E exp(-sigma (1 - z)) (1 - exp(-2 sigma))`; and
-/// from nearly above.
+/// from above.
 #[test]
 fn single_scattering_in_a_cube() {
+    // Steps that all lie alike in the skin would add up what the few points of its kernel miss there, a percent.
+    let fine = PhotonSettings { photons: 50_000, steps_per_voxel: 8.0, ..PHOTONS };
     let sigma = 0.8_f64;
     let albedo = Rgb::new(0.5, 1.0, 0.2);
     for g in [0.0, 0.6, -0.5] {
@@ -197,11 +202,15 @@ fn single_scattering_in_a_cube() {
             let mean = (through(edge(row)) - through(edge(row + 1))) / (edge(row) - edge(row + 1));
             colored(phase(0.0) * mean * (1.0 - (-2.0 * sigma).exp()))
         };
-        photons(&aside).assert_near(&Estimate::exactly(light), BIAS, &format!("aside, g = {g}"));
+        photons(&aside, fine).assert_near(&Estimate::exactly(light), BIAS, &format!("aside, g = {g}"));
         let mut above = seen(setup(), Vec3::X * 5.0, Vec3::ZERO, 1.2);
         above.camera = Camera::new(Vec3::Z * 5.0, Vec3::ZERO, Vec3::Y, Lens::Orthographic { height: 1.2 });
         let back = phase(-1.0) * (1.0 - (-4.0 * sigma).exp()) / 2.0;
-        photons(&above).assert_near(&Estimate::exactly(|_| colored(back)), BIAS, &format!("above, g = {g}"));
+        photons(&above, fine).assert_near(
+            &Estimate::exactly(|_| colored(back)),
+            BIAS,
+            &format!("above, g = {g}"),
+        );
     }
 }
 
@@ -218,10 +227,10 @@ fn white_furnace() {
             phase: henyey_greenstein(g),
             lights: vec![Light::Environment(Environment::constant(Rgb::WHITE, true))],
             max_scatter: 1000,
-            ..Setup::new(volume([32; 3], [2.0; 3], at::<32>(lumps)), ramp(white), density)
+            ..Setup::new(volume([32; 3], [2.0; 3], of_32(lumps)), ramp(white), density)
         };
         let scene = seen(setup, ASIDE, Vec3::ZERO, 2.0);
-        photons(&scene).assert_near(&Estimate::exactly(|_| [1.0; 3]), BIAS, name);
+        photons(&scene, PHOTONS).assert_near(&Estimate::exactly(|_| [1.0; 3]), BIAS, name);
     }
 }
 
@@ -254,7 +263,8 @@ fn lights_of_every_kind() {
         ("sun", sun()),
         ("wide sun", Light::Directional(Directional::new(-away, white, 40.0))),
         ("point", Light::Point(PointLight { position: away, intensity: white })),
-        ("point inside", Light::Point(PointLight { position: Vec3::new(0.5, -0.6, 0.6), intensity: white })),
+        // Beside the picture, where no ray comes near.
+        ("point inside", Light::Point(PointLight { position: Vec3::new(0.95, 0.9, -0.9), intensity: white })),
         ("rect", Light::Rect(Rect::new(away, -away, Vec3::Z, [1.0, 0.5], white))),
         ("rect inside", Light::Rect(Rect::new(Vec3::Z * 0.9, -Vec3::Z, Vec3::X, [1.0, 0.5], white))),
         ("disk", Light::Disk(Disk::new(away, Vec3::new(-1.0, 0.2, -1.0), 0.6, white))),
@@ -287,9 +297,23 @@ fn black_channels_and_several_lights() {
 fn the_number_of_photons_is_no_brightness() {
     let setup = Setup { density: 0.3, ..sunny(0.9) };
     let scene = seen(setup, ASIDE, Vec3::ZERO, 1.6);
-    let with = |photons| estimate(&scene, IntegratorKind::Photon(PhotonSettings { photons, ..PHOTONS }), 1);
+    let with = |count| photons(&scene, PhotonSettings { photons: count, ..PHOTONS });
     // No power of two, and far from whole blocks of numbers that are stratified together.
-    with(70_001).assert_near(&with(700_000), BIAS, "photons");
+    with(200_001).assert_near(&with(1_000_000), BIAS, "photons");
+}
+
+/// From the nearest photons, and along the beam.
+#[test]
+fn the_other_estimates() {
+    use scene::Estimate::{Beam, Nearest};
+    let optics = Optics { surface: 0.5, ..Optics::default() };
+    let setup = Setup { points: ramp(optics), phase: henyey_greenstein(0.4), ..sunny(0.0) };
+    let scene = seen(setup, ASIDE, Vec3::ZERO, 1.6);
+    let exact = path(&scene);
+    for (name, estimate_by, radius) in [("nearest", Nearest(24), 3.0), ("beam", Beam, 1.0)] {
+        let settings = PhotonSettings { estimate: estimate_by, radius, ..PHOTONS };
+        estimate(&scene, IntegratorKind::Photon(settings), 1).assert_near(&exact, BIAS, name);
+    }
 }
 
 /// A glowing ball lights a layer below it; the picture shows the layer alone.
@@ -305,9 +329,10 @@ fn glowing_matter_lights_other_matter() {
     let clear = |optics| Optics { opacity: 0.0, ..optics };
     let points = [(-1.0, dark), (0.0, clear(dark)), (0.0, clear(glow)), (1.0, glow)];
     let points = points.map(|(value, optics)| Point { value, optics }).to_vec();
-    let setup =
-        Setup { max_scatter: 20, ..Setup::new(volume([32; 3], [2.0; 3], at::<32>(value)), points, 2.0) };
-    assert_as_path("glow", &seen(setup, Vec3::new(0.0, -5.0, -0.6), -Vec3::Z * 0.6, 0.7));
+    let setup = Setup { max_scatter: 20, ..Setup::new(volume([32; 3], [2.0; 3], of_32(value)), points, 2.0) };
+    // Most of the light goes elsewhere.
+    let many = PhotonSettings { photons: 1_500_000, radius: 1.5, ..PHOTONS };
+    assert_as_path_with(many, "glow", &seen(setup, Vec3::new(0.0, -5.0, -0.6), -Vec3::Z * 0.6, 0.7));
 }
 
 /// Voxels of unlike edges, turned, sheared and left-handed.
@@ -334,9 +359,11 @@ fn grids_of_any_shape() {
 fn a_camera_inside() {
     let mut scene = seen(sunny(0.8), ASIDE, Vec3::ZERO, 1.6);
     let lens = Lens::Perspective { fov: 80.0, aperture: 0.0, focus: 1.0 };
-    scene.camera = Camera::new(Vec3::new(0.2, -0.3, 0.0), Vec3::new(0.0, 1.0, 0.2), Vec3::Z, lens);
+    scene.camera = Camera::new(Vec3::new(0.2, -0.6, 0.0), Vec3::new(0.0, 1.0, 0.2), Vec3::Z, lens);
     scene.background = Background::Color(Rgb::new(0.02, 0.0, 0.05));
-    assert_as_path("inside", &scene);
+    // All rays pass the same few photons at first.
+    let many = PhotonSettings { photons: 400_000, radius: 1.5, ..PHOTONS };
+    assert_as_path_with(many, "inside", &scene);
 }
 
 /// Nothing lies, and no light goes lost, behind a cut.
@@ -348,22 +375,21 @@ fn a_cut_cloud() {
 
 #[test]
 fn voxels_without_interpolation() {
-    let volume = blocks([32; 3], [2.0; 3], at::<32>(cloud));
+    let volume = blocks([32; 3], [2.0; 3], of_32(cloud));
     assert_as_path("blocks", &seen(Setup { volume, ..sunny(0.8) }, ASIDE, Vec3::ZERO, 1.6));
 }
 
 /// Later passes gather more narrowly, by photons of their own: blur and noise both decrease.
 #[test]
 fn refinement_converges() {
-    const PASSES: u32 = 20;
+    const PASSES: u32 = 16;
     let scene = seen(sunny(0.8), ASIDE, Vec3::ZERO, 1.6);
-    let settings = PhotonSettings { photons: 30_000, radius: 6.0, ..PHOTONS };
+    let settings = PhotonSettings { photons: 15_000, radius: 7.0, ..PHOTONS };
     let after = |passes| estimate(&scene, IntegratorKind::Photon(settings), passes);
     let (exact, first, last) = (path(&scene), after(1), after(PASSES));
     let noise = |of: &Estimate| of.blocks.iter().map(Mean::variance_of_mean).sum::<f64>();
     let off = [first.blocks_off(&exact, 1), last.blocks_off(&exact, 1)];
-    println!("off {off:?} noise {} {}", noise(&first), noise(&last));
-    assert!(off[0] > 0.02 && off[1] < 0.7 * off[0], "blocks off by {off:?}");
+    assert!(off[0] > 0.02 && off[1] < 0.85 * off[0], "blocks off by {off:?} after one pass and the last");
     assert!(noise(&last) < noise(&first) / 8.0, "noise {} after {}", noise(&last), noise(&first));
     last.assert_near(&exact, 2.0 * BIAS, "refined");
 }
