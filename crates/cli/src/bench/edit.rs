@@ -93,8 +93,8 @@ impl Edit<'_> {
             edit.add(&live, start);
             let done = computed(&live);
             shares = [0, 1].map(|i| if all[i] > 0.0 { done[i] / all[i] } else { 0.0 });
-            if self.against == Against::Equal && bits(&live) != picture {
-                return Err(Failure::input("the picture after the edit is not the one from nothing"));
+            if self.against == Against::Equal {
+                check(&bits(&live), &picture)?;
             }
             if !patient(4.0) {
                 break;
@@ -149,8 +149,18 @@ fn computed(session: &Session) -> [f64; 2] {
     stages(&session.recomputed())
 }
 
-/// The picture, to be compared bit by bit.
+/// The picture as bits: colour and alpha of all pixels, then their depth.
 fn bits(session: &Session) -> Vec<u32> {
     let image = session.image();
     image.rgba.as_flattened().iter().chain(&image.depth).map(|x| x.to_bits()).collect()
+}
+
+fn check(live: &[u32], fresh: &[u32]) -> Result<(), Failure> {
+    let numbers = |(a, b): (&u32, &u32)| (a != b).then(|| (f32::from_bits(*a), f32::from_bits(*b)));
+    let mut differing = live.iter().zip(fresh).filter_map(numbers);
+    let Some((a, b)) = differing.next() else { return Ok(()) };
+    let (count, all) = (1 + differing.count(), live.len());
+    Err(Failure::input(format!(
+        "the picture after the edit is not the one from nothing: {count} of {all} numbers differ, the first is {a} in place of {b}"
+    )))
 }
