@@ -2,7 +2,7 @@
 
 use super::lights::{LightPaths, Plan, sources};
 use super::paths::Past;
-use super::{PhotonMapping, SegmentTile};
+use super::{PhotonMapping, SegmentTile, step};
 use crate::light::Light;
 use crate::scene::{Difference, Scene};
 use crate::transfer::{BinSet, HistoryGroups, Historygram, TransferFunction};
@@ -90,7 +90,8 @@ impl PhotonMapping {
         if difference.density.is_some() {
             self.map = None;
         }
-        if difference.camera || difference.size {
+        // With other steps, segments end elsewhere.
+        if difference.camera || difference.size || step(old, &self.settings) != step(new, &self.settings) {
             self.has_segments = false;
         }
         for tile in tiles {

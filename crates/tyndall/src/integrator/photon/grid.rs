@@ -1,4 +1,4 @@
-//! A grid of cells as wide as the gather radius: what lies within the radius of a place lies in its cell or a neighbour's.
+//! A grid of cells as wide as a gather reaches: what it takes lies in its place's cell or a neighbour's.
 
 use crate::math::{Bounds, DMat3, DVec3, Mat3, Vec3, cast};
 use crate::volume::Grid;
@@ -29,8 +29,8 @@ pub(super) struct CellGrid {
 }
 
 impl CellGrid {
-    /// Over a volume's box, for a radius in world units.
-    pub fn new(grid: &Grid, radius: f32) -> Self {
+    /// Over a volume's box, for a radius in world units and gathers that reach so many radii along an axis.
+    pub fn new(grid: &Grid, radius: f32, reach: f32) -> Self {
         let middle = grid.index_bounds().center();
         let direction = DMat3::from_cols_array_2d(&grid.direction()).transpose();
         let per_radius = DVec3::from_array(grid.spacing()) / f64::from(radius);
@@ -38,15 +38,16 @@ impl CellGrid {
         let (linear, to_index) = (linear.as_mat3(), linear.inverse().as_mat3());
         let around = Bounds::around(grid.index_bounds().corners().map(|p| linear * (p - middle)));
         let cells = |edge: f32| (around.size() / edge).ceil().max(Vec3::ONE);
-        let mut edge = 1.0 + MARGIN;
+        let mut edge = reach * (1.0 + MARGIN);
         while cells(edge).element_product() > MOST_CELLS {
             edge *= 1.1;
         }
         let dims = cells(edge).to_array().map(cast::index);
-        // A sphere reaches as far along an axis as that axis's row of the inverse is long.
+        // A box reaches as far along an axis of index space as the entries of its row of the inverse say together.
         let rows = to_index.transpose();
-        let lengths = Vec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length());
-        let index_reach = lengths * (1.0 + MARGIN) + MARGIN;
+        let entries = |row: Vec3| row.abs().element_sum();
+        let box_ = Vec3::new(entries(rows.x_axis), entries(rows.y_axis), entries(rows.z_axis));
+        let index_reach = box_ * (2.0 * edge * (1.0 + MARGIN)) + MARGIN;
         Self { to_index, middle, linear, origin: around.min, edge, per_edge: 1.0 / edge, dims, index_reach }
     }
 
@@ -56,7 +57,7 @@ impl CellGrid {
         &self.to_index
     }
 
-    /// How far the radius reaches along each axis of index space.
+    /// How far a cell and its neighbours reach from any place in it, along each axis of index space.
     pub fn index_reach(&self) -> Vec3 {
         self.index_reach
     }
@@ -120,9 +121,9 @@ impl CellGrid {
         cast::fit_u32(cast::index(share * AXIS_BITS).min(63))
     }
 
-    /// Bits along each axis that lie within the radius of a metric place.
+    /// Bits along each axis that lie in the cell of a metric place or its neighbours.
     pub fn axis_reach(&self, p: Vec3) -> [u64; 3] {
-        let r = 1.0 + MARGIN;
+        let r = 2.0 * self.edge * (1.0 + MARGIN);
         [0, 1, 2].map(|axis| {
             let [first, last] = [p[axis] - r, p[axis] + r].map(|x| self.axis_bin(x, axis));
             u64::MAX << first & u64::MAX >> (63 - last)
@@ -145,7 +146,7 @@ mod tests {
     #[test]
     fn what_is_within_the_radius_is_in_the_cells_around_and_among_the_neighbours() {
         let grid = skewed();
-        let cells = CellGrid::new(&grid, 1.7);
+        let cells = CellGrid::new(&grid, 1.7, 1.0);
         let mut random = SplitMix::new(5);
         let mut near = 0;
         for _ in 0..20_000 {
@@ -174,7 +175,7 @@ mod tests {
 
     #[test]
     fn a_tiny_radius_asks_for_no_more_cells_than_there_may_be() {
-        let cells = CellGrid::new(&skewed(), 1e-6);
+        let cells = CellGrid::new(&skewed(), 1e-6, 1.0);
         assert!(cells.len() <= 1 << 24 && cells.len() > 1 << 22, "{}", cells.len());
     }
 }

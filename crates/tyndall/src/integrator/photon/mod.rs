@@ -30,7 +30,7 @@ use super::Stop;
 use crate::film::Tile;
 use crate::light::Enclosure;
 use crate::math::DVec3;
-use crate::scene::{PhotonSettings, Scene, SpatialHistory};
+use crate::scene::{Estimate, PhotonSettings, Scene, SpatialHistory};
 use crate::simd::Level;
 use crate::transfer::HistoryGroups;
 use grid::CellGrid;
@@ -71,9 +71,8 @@ impl PhotonMapping {
         let cell_values = volume.cells_of(medium.majorants().voxels());
         let of_cell = |&[lo, hi]: &[f32; 2]| groups.between(bins.bin(lo), bins.bin(hi));
         let cells = cell_values.ranges().iter().map(of_cell).collect();
-        // A step is asked for at its middle, and reaches photons from all of its width.
-        let reach = settings.radius + 0.5 / settings.steps_per_voxel;
-        let grid = CellGrid::new(volume.grid(), reach * volume.grid().voxel_size());
+        // The map's own cells: photons are added up in the order of whole cells, so that one beside a gather moves its last bit.
+        let grid = cells_for(scene, &settings, settings.radius);
         // When so many photons have changed, few segments are left that gather none of them.
         let enough = settings.photons as usize / 2;
         let places = match settings.spatial {
@@ -150,7 +149,7 @@ impl PhotonMapping {
         segments: &mut Option<SegmentTile>,
         stop: &Stop,
     ) -> bool {
-        let step = self.step(scene);
+        let step = step(scene, &self.settings);
         if tile.samples() > 0 {
             let map = self.pass.as_ref().and_then(|pass| pass.map.as_ref());
             let view = View { scene, map, step };
@@ -164,15 +163,6 @@ impl PhotonMapping {
         });
         let view = View { scene, map: self.map.as_ref(), step };
         level.run(Refine { view, segments, tile, groups, cells, places: &self.places, stop })
-    }
-
-    /// Step of a view ray, world units: so short that little light is lost in the densest matter within one, since light and
-    /// view then change as fast; but not without end.
-    fn step(&self, scene: &Scene) -> f32 {
-        const THICKEST: f32 = 0.5;
-        const SHORTEST: f32 = 1.0 / 16.0;
-        let usual = scene.medium.volume().grid().voxel_size() / self.settings.steps_per_voxel;
-        usual.min((THICKEST / scene.medium.density()).max(SHORTEST * usual))
     }
 
     /// Paths, and of these the ones traced since the last edit.
@@ -207,6 +197,25 @@ impl PhotonMapping {
     }
 }
 
+/// Step of a view ray, world units: so short that little light is lost in the densest matter within one, since light and
+/// view then change as fast; but not without end.
+fn step(scene: &Scene, settings: &PhotonSettings) -> f32 {
+    const THICKEST: f32 = 0.5;
+    const SHORTEST: f32 = 1.0 / 16.0;
+    let usual = scene.medium.volume().grid().voxel_size() / settings.steps_per_voxel;
+    usual.min((THICKEST / scene.medium.density()).max(SHORTEST * usual))
+}
+
+/// The cells for photons that are gathered within a radius, in voxels.
+fn cells_for(scene: &Scene, settings: &PhotonSettings, radius: f32) -> CellGrid {
+    let grid = scene.medium.volume().grid();
+    let radius = radius * grid.voxel_size();
+    // A step's part of a beam is a cylinder, whose corners lie outside of the sphere.
+    let half = 0.5 * step(scene, settings) / radius;
+    let reach = if settings.estimate == Estimate::Beam { (1.0 + half * half).sqrt() } else { 1.0 };
+    CellGrid::new(grid, radius, reach)
+}
+
 /// The paths of all lights at one time.
 #[derive(Clone, Debug)]
 pub(super) struct Paths(Vec<LightPaths>);
@@ -229,6 +238,7 @@ impl Paths {
 /// Sorts the photons of all lights; `radius` in voxels.
 fn sorted(scene: &Scene, radius: f32, settings: &PhotonSettings, lights: &[LightPaths]) -> PhotonMap {
     let grid = scene.medium.volume().grid();
+    let cells = cells_for(scene, settings, radius);
     let radius = radius * grid.voxel_size();
     // In double precision, since world units may be anything.
     let per_volume = f64::from(radius).powi(3).recip() / f64::from(scene.medium.density());
@@ -238,5 +248,5 @@ fn sorted(scene: &Scene, radius: f32, settings: &PhotonSettings, lights: &[Light
     };
     let lit: Vec<Lit> =
         lights.iter().map(|light| Lit { chunks: &light.chunks, scale: scale(light) }).collect();
-    PhotonMap::new(CellGrid::new(grid, radius), radius, settings.estimate, &lit)
+    PhotonMap::new(cells, radius, settings.estimate, &lit)
 }
