@@ -87,7 +87,9 @@ impl PhotonMap {
                 }
             }
         }
-        sum.total() / (kernel.volume() * matter.opacity)
+        let light = sum.total() / (kernel.volume() * matter.opacity);
+        // Matter so thin that single precision holds no such quotient shows nothing.
+        if light.to_array().iter().all(|x| x.is_finite()) { light } else { Rgb::BLACK }
     }
 
     /// Photons from the `i`-th on, relative to a metric place.

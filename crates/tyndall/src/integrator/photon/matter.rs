@@ -19,6 +19,9 @@ const MOST_LEAN: f32 = 0.75;
 /// inverse.
 const LEAST_SPREAD: f32 = 0.02;
 
+/// Matter thinner than this scatters nothing that single precision tells.
+const LEAST_OPACITY: f32 = 1e-30;
+
 /// What a fit by moments makes of photons.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Matter {
@@ -62,22 +65,26 @@ impl Matter {
             (xy, xz, yz) = (ox.mul_add(y, xy), ox.mul_add(z, xz), oy.mul_add(z, yz));
             first += S::WIDTH;
         }
-        // The place itself is one of the points: there is matter.
+        // The place itself is one of the points: there is matter, but for rounding.
         let mean = (total(sum.as_slice()) + own) / (MOST_LANES + 1) as f32;
-        let moment = |lanes: &[f32]| total(lanes) / (MOST_LANES + 1) as f32;
+        if mean < LEAST_OPACITY {
+            return Self { opacity: 0.0, slope: Vec3::ZERO };
+        }
+        // Over the mean, which may be small, and its powers smaller than any number.
+        let per_mean = 1.0 / (mean * (MOST_LANES + 1) as f32);
+        let moment = |lanes: &[f32]| total(lanes) * per_mean;
         let lean = Vec3::new(moment(sx.as_slice()), moment(sy.as_slice()), moment(sz.as_slice()));
         let (xx, yy, zz) = (moment(xx.as_slice()), moment(yy.as_slice()), moment(zz.as_slice()));
         let (xy, xz, yz) = (moment(xy.as_slice()), moment(xz.as_slice()), moment(yz.as_slice()));
-        let least = LEAST_SPREAD * mean * kernel.reach().length_squared() / 3.0;
+        let least = LEAST_SPREAD * kernel.reach().length_squared() / 3.0;
         let spread = Mat3::from_cols(
             Vec3::new(xx + least, xy, xz),
             Vec3::new(xy, yy + least, yz),
             Vec3::new(xz, yz, zz + least),
         );
         let slope = spread.inverse() * lean;
-        let most = MOST_LEAN * mean;
-        let slope = slope * (most / slope.dot(lean).max(most));
-        Self { opacity: mean - slope.dot(lean), slope }
+        let slope = slope * (MOST_LEAN / slope.dot(lean).max(MOST_LEAN));
+        Self { opacity: mean * (1.0 - slope.dot(lean)), slope }
     }
 }
 
