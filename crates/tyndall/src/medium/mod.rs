@@ -7,6 +7,7 @@ mod free_flight;
 mod majorants;
 mod march;
 mod reach;
+mod skip;
 
 pub use clip::{Clip, ClipShape};
 pub use free_flight::Collision;

@@ -46,13 +46,7 @@ impl LightPathSampler {
             let mut stream = self.stream(bounce | 1 << 31);
             [(); 2].map(|()| [(); 4].map(|()| stream.uniform()))
         };
-        BounceSample {
-            flight: a[0],
-            light_choice: a[1],
-            light: [a[2], a[3]],
-            scatter: [b[0], b[1], b[2]],
-            roulette: b[3],
-        }
+        BounceSample::of(a, b)
     }
 
     /// Numbers for the tracking of the `bounce`-th flight, whose count is not known beforehand.

@@ -26,6 +26,18 @@ pub struct BounceSample {
 }
 
 impl BounceSample {
+    /// From eight numbers.
+    #[inline]
+    pub(super) fn of(a: [f32; 4], b: [f32; 4]) -> Self {
+        Self {
+            flight: a[0],
+            light_choice: a[1],
+            light: [a[2], a[3]],
+            scatter: [b[0], b[1], b[2]],
+            roulette: b[3],
+        }
+    }
+
     /// Optical depth to the flight's first tentative collision, exponentially distributed.
     #[inline]
     #[must_use]
@@ -69,13 +81,7 @@ impl PathSampler {
             let mut block = || [(); 4].map(|()| self.stream.uniform());
             (block(), block())
         };
-        BounceSample {
-            flight: a[0],
-            light_choice: a[1],
-            light: [a[2], a[3]],
-            scatter: [b[0], b[1], b[2]],
-            roulette: b[3],
-        }
+        BounceSample::of(a, b)
     }
 }
 

@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 use tyndall::film::Image;
 use tyndall::light::{Directional, Environment, Light};
 use tyndall::math::{Rgb, Vec3};
-use tyndall::scene::{IntegratorKind, Scene};
+use tyndall::scene::{Estimate, Histories, IntegratorKind, PhotonSettings, Scene, SpatialHistory};
 use tyndall::session::{Budget, Session};
-use tyndall::transfer::{Optics, Point};
+use tyndall::transfer::{Grouping, Optics, Point};
 
 fn scene(integrator: IntegratorKind) -> Scene {
     let value = |p: [usize; 3]| ((p[0] * 5 + p[1] * 3 + p[2] * 7) % 11) as f32 / 10.0;
@@ -45,7 +45,18 @@ fn picture(scene: &Scene, threads: usize, slice: Option<Duration>) -> Image {
 fn threads_and_slices_leave_no_trace() {
     let march = |step| IntegratorKind::RayMarch { step, light_samples: 4 };
     // Without scattering a march stops between samples, of which it then takes many.
-    for (kind, max_scatter) in [(IntegratorKind::Path, 8), (march(0.5), 8), (march(0.01), 0)] {
+    let photons = IntegratorKind::Photon(PhotonSettings {
+        photons: 20_000,
+        radius: 1.5,
+        segments: 5,
+        steps_per_voxel: 2.0,
+        estimate: Estimate::Point,
+        histories: Histories::Interactions,
+        history_bits: 64,
+        bins: Grouping::Quantile,
+        spatial: SpatialHistory::Cells,
+    });
+    for (kind, max_scatter) in [(IntegratorKind::Path, 8), (march(0.5), 8), (march(0.01), 0), (photons, 8)] {
         let mut scene = scene(kind);
         scene.render.max_scatter = max_scatter;
         let one = picture(&scene, 1, None);
@@ -56,7 +67,7 @@ fn threads_and_slices_leave_no_trace() {
         let mut other = scene.clone();
         other.render.seed += 1;
         assert_eq!(
-            kind == IntegratorKind::Path,
+            !matches!(kind, IntegratorKind::RayMarch { .. }),
             one != picture(&other, 2, None),
             "only Monte Carlo has a seed"
         );

@@ -141,19 +141,20 @@ impl PhotonMapping {
         true
     }
 
-    /// Takes the next sample of every pixel of a tile; false where a stop came first.
+    /// Takes the next sample of every pixel of a tile, unless a stop comes first.
     pub(super) fn refine(
         &self,
         scene: &Scene,
         tile: &mut Tile,
         segments: &mut Option<SegmentTile>,
         stop: &Stop,
-    ) -> bool {
+    ) {
         let step = step(scene, &self.settings);
         if tile.samples() > 0 {
             let map = self.pass.as_ref().and_then(|pass| pass.map.as_ref());
             let view = View { scene, map, step };
-            return self.ground.level.run(pass::Refine { view, tile, stop });
+            self.ground.level.run(pass::Refine { view, tile, stop });
+            return;
         }
         let Ground { groups, cells, level, .. } = &self.ground;
         let per_ray = self.settings.segments as usize;
@@ -162,7 +163,7 @@ impl PhotonMapping {
             SegmentTile::new(pixels, per_ray, groups.count())
         });
         let view = View { scene, map: self.map.as_ref(), step };
-        level.run(Refine { view, segments, tile, groups, cells, places: &self.places, stop })
+        level.run(Refine { view, segments, tile, groups, cells, places: &self.places, stop });
     }
 
     /// Paths, and of these the ones traced since the last edit.

@@ -61,7 +61,7 @@ impl Pass {
     }
 }
 
-/// Takes a sample of every pixel of a tile, along jittered rays with jittered steps; false where a stop came first.
+/// Takes a sample of every pixel of a tile, along jittered rays with jittered steps, unless a stop comes first.
 pub(super) struct Refine<'a> {
     pub view: View<'a>,
     pub tile: &'a mut Tile,
@@ -69,10 +69,10 @@ pub(super) struct Refine<'a> {
 }
 
 impl Kernel for Refine<'_> {
-    type Output = bool;
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes>(self, simd: S) -> bool {
+    fn run<S: Lanes>(self, simd: S) {
         let Self { view, tile, stop } = self;
         let (scene, target) = (view.scene, tile.samples() + 1);
         while tile.samples() < target {
@@ -100,10 +100,9 @@ impl Kernel for Refine<'_> {
                 });
             }
             if stop.reached() {
-                return false;
+                return;
             }
         }
-        true
     }
 }
 

@@ -184,8 +184,8 @@ fn forget_near(view: &View, pixel: [u32; 2], places: &Changed, light: &mut [[f32
     }
 }
 
-/// Computes the segments of a tile that show and are not known, and gives each pixel its sample; gives whether it came
-/// to that.
+/// Computes the segments of a tile that show and are not known, and gives each pixel its sample, unless a
+/// stop comes first.
 pub(super) struct Refine<'a> {
     pub view: View<'a>,
     pub segments: &'a mut SegmentTile,
@@ -197,10 +197,10 @@ pub(super) struct Refine<'a> {
 }
 
 impl Kernel for Refine<'_> {
-    type Output = bool;
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Lanes>(self, simd: S) -> bool {
+    fn run<S: Lanes>(self, simd: S) {
         let Self { view, segments, tile, groups, cells, places, stop } = self;
         let pixels: Vec<[u32; 2]> = tile.next(usize::MAX).0.collect();
         segments.invalidate(&view, &pixels, places);
@@ -236,7 +236,7 @@ impl Kernel for Refine<'_> {
                 }
                 segments.computed += packet.len();
                 if stop.reached() {
-                    return false;
+                    return;
                 }
             }
             lacking.retain(|&ray| segments.missing(ray).is_some());
@@ -244,7 +244,6 @@ impl Kernel for Refine<'_> {
         for (ray, of_ray) in rays.iter().enumerate() {
             tile.add(&segments.composite(view.scene, ray, of_ray));
         }
-        true
     }
 }
 
