@@ -27,10 +27,18 @@ def ratios(sigma):
     one = lambda y: 1.0
 
     def fit(q):
-        m0, m1, m2 = (moment(q, power, one) for power in range(3))
-        c = m1 / (m2 + 0.02 * m0)
+        # The ball is flattened where matter leans to one side and is dense.
+        lean = abs(moment(q, 1, one) / moment(q, 0, one))
+        h = 1 - min(lean / 0.1, 1) * (1 - min(1.5 / sigma, 1))
+        low, high = max(q - h, 0), q + h
+
+        def flat(power, weight):
+            return integral(lambda y: kernel((y - q) / h) / h * (y - q) ** power * weight(y), low, high)
+
+        m0, m1, m2 = (flat(power, one) for power in range(3))
+        c = m1 / (m2 + 0.02 * h * h)
         c *= 0.75 * m0 / max(c * m1, 0.75 * m0)
-        return (moment(q, 0, fluence) - c * moment(q, 1, fluence)) / (m0 - c * m1)
+        return (flat(0, fluence) - c * flat(1, fluence)) / (m0 - c * m1)
 
     photon = seen(lambda q: moment(q, 0, fluence))
     mean = seen(lambda q: moment(q, 0, fluence) / moment(q, 0, one))

@@ -270,6 +270,31 @@ fn few_of_many_photons_change_the_sums_beside_them() {
     }
 }
 
+/// A little more or less opacity moves hardly any photon, but each weighs more or less where it lies beside thinner matter.
+#[test]
+fn photons_that_stay_in_matter_that_changes() {
+    let mut value = base("photon");
+    let point = |value: f64, opacity: f64| json!({ "value": value, "opacity": opacity });
+    let points = |opacity: f64| {
+        json!([point(0.399, 0.1), point(0.4, opacity), point(0.45, opacity), point(0.451, 1.0)])
+    };
+    value["volume"]["interpolation"] = "nearest".into();
+    value["film"]["size"] = json!([48, 40]);
+    value["render"]["photon"] = json!({ "photons": 20_000, "radius": 2.0, "segments": 20 });
+    value["transfer_function"]["points"] = points(0.5);
+    let mut live = Session::new(scene(&value), THREADS.clone());
+    refined(&mut live, 1);
+    for opacity in [0.5001, 0.4999, 0.5003] {
+        value["transfer_function"]["points"] = points(opacity);
+        live.set_scene(scene(&value));
+        let found = refined(&mut live, 1);
+        let segments = live.recomputed()[1].1;
+        assert!(segments > 0.0 && segments < 0.99, "{segments}");
+        let expected = refined(&mut Session::new(scene(&value), THREADS.clone()), 1);
+        assert!(found == expected, "opacity {opacity}");
+    }
+}
+
 /// Lights keep their numbers by their names, and photons are added up by these, not by the document's order.
 #[test]
 fn the_order_of_named_lights_moves_no_photon() {

@@ -133,7 +133,11 @@ impl Kernel for Update<'_> {
                     let past = tracer.trace(&numbers, from.as_ref().map(|(p, past)| (p, *past)), &mut found);
                     chunk.flight.set(path, past.flight);
                     chunk.scatter.set(path, past.scatter);
-                    places.mark_difference(&chunk.photons()[kept.end..old.end], &found.photons[first..]);
+                    // A gather weighs photons by the opacity where they are.
+                    let matter_changed =
+                        |photon: &Photon| tracer.read_at(photon.index_place()).meets(chunk.changed.flight);
+                    let (old, new) = (&chunk.photons()[kept.end..old.end], &found.photons[first..]);
+                    places.mark_difference(old, new, matter_changed);
                     retraced += 1;
                 } else {
                     found.extend(&chunk.interactions, chunk.range(path));

@@ -3,7 +3,7 @@
 use super::kernel::{Ball, Kernel, Slice};
 use super::map::PhotonMap;
 use super::matter::Matter;
-use crate::math::{Frame, PackedDirection, Rgb, Vec3};
+use crate::math::{PackedDirection, Rgb, Vec3};
 use crate::medium::{MarchNotes, Medium};
 use crate::scattering::{Brdf, Event, Phase};
 use crate::scene::Estimate;
@@ -39,16 +39,16 @@ impl PhotonMap {
         distances: &mut Vec<f32>,
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
-        let points = &self.points;
+        let (points, number) = (&self.points, number_of(at.place));
         match self.estimate {
-            Estimate::Point => self.within(simd, medium, at, &Ball { radius: 1.0, points }, notes),
+            Estimate::Point => self.within(simd, medium, at, Ball::new(1.0, number, points), notes),
             Estimate::Nearest(count) => {
                 let radius = self.radius_of(simd, at, count as usize, distances);
-                self.within(simd, medium, at, &Ball { radius, points }, notes)
+                self.within(simd, medium, at, Ball::new(radius, number, points), notes)
             }
             Estimate::Beam => {
-                let slice = Slice { width: at.width / self.radius, frame: Frame::around(-at.w_out), points };
-                self.within(simd, medium, at, &slice, notes)
+                let slice = Slice::new(at.width / self.radius, -at.w_out, number, points);
+                self.within(simd, medium, at, slice, notes)
             }
         }
     }
@@ -60,15 +60,24 @@ impl PhotonMap {
         simd: S,
         medium: &Medium,
         at: &Gathering,
-        kernel: &K,
+        mut kernel: K,
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
         let (q, here) = (self.grid.to_metric(at.place), (at.place, at.opacity, at.lane));
-        let matter = Matter::about(simd, medium, here, self.grid.index_per_metric(), kernel, notes);
+        let index = self.grid.index_per_metric();
+        let mut matter = Matter::about(simd, medium, here, index, &kernel, notes);
+        // World units over the mean free path.
+        let thickness = self.radius * medium.density() * at.opacity;
+        if let Some((axis, share)) = flat_skin(matter.lean, kernel.reach().max_element(), thickness) {
+            kernel = kernel.flattened(axis, share);
+            matter = Matter::about(simd, medium, here, index, &kernel, notes);
+        }
         if matter.opacity <= 0.0 {
             return Rgb::BLACK;
         }
         let slope = matter.slope;
+        let own = S::f32s::splat(simd, at.opacity);
+        let one = S::f32s::splat(simd, 1.0);
         let mut sum = Sum::new(simd, at);
         let number = S::f32s::from_fn(simd, |lane| lane as f32);
         let [x, [y0, y1], [z0, z1]] = self.grid.around(q, kernel.reach());
@@ -80,8 +89,9 @@ impl PhotonMap {
                     let there = number.simd_lt(S::f32s::splat(simd, (end - i) as f32));
                     let near = kernel.holds(simd, [dx, dy, dz]) & there;
                     if near.any_true() {
-                        let weight = -(dx * slope.x + dy * slope.y + dz * slope.z) + 1.0;
-                        sum.add(self, i, near, weight);
+                        let linear = -(dx * slope.x + dy * slope.y + dz * slope.z) + 1.0;
+                        let share = (load(simd, &self.per_opacity, i) * own).min(one);
+                        sum.add(self, i, near, linear * share);
                     }
                     i += S::WIDTH;
                 }
@@ -124,6 +134,32 @@ impl PhotonMap {
         // Photons may lie on the very place; a sphere has some extent.
         nth.sqrt().max(1e-3)
     }
+}
+
+/// A number as good as drawn by lot, the same whenever the place is.
+#[inline(always)]
+fn number_of(place: Vec3) -> usize {
+    let mixed = |hash: u32, x: f32| (hash ^ x.to_bits()).wrapping_mul(0x9e37_79b9).rotate_left(15);
+    place.to_array().into_iter().fold(0, mixed) as usize
+}
+
+/// Optical depth within which fluence falls about as its linear fit does.
+const MOST_THICK: f32 = 1.5;
+
+/// At a skin matter leans by so much of the radius, or more.
+const LEAN_OF_SKIN: f32 = 0.1;
+
+/// Along which axis a gather is to be flattened, and to what share of its radius: at the skin of matter so dense that little
+/// light gets as deep as the radius. `thickness` is the optical depth of the map's radius.
+#[inline(always)]
+fn flat_skin(lean: Vec3, radius: f32, thickness: f32) -> Option<(Vec3, f32)> {
+    let thickness = thickness * radius;
+    if thickness <= MOST_THICK {
+        return None;
+    }
+    let skin = (lean.length() / (LEAN_OF_SKIN * radius)).min(1.0);
+    let share = 1.0 - skin * (1.0 - MOST_THICK / thickness);
+    lean.try_normalize().map(|axis| (axis, share))
 }
 
 #[inline(always)]

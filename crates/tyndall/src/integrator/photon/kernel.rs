@@ -1,6 +1,6 @@
 //! Over which part of space a gather takes photons together; lengths in units of the map's radius.
 
-use crate::math::{Frame, Vec3};
+use crate::math::{Frame, Mat3, Vec3};
 use crate::medium::MOST_LANES;
 use crate::simd::Lanes;
 use fearless_simd::prelude::*;
@@ -11,8 +11,14 @@ pub(super) trait Kernel: Copy {
     /// How far it reaches along each axis.
     fn reach(&self) -> Vec3;
 
+    /// Product of the reaches along each pair of axes.
+    fn squared_reach(&self) -> Mat3;
+
     /// In units of the radius cubed.
     fn volume(&self) -> f32;
+
+    /// The same, but reaching along an axis no further than a share of the radius.
+    fn flattened(self, axis: Vec3, share: f32) -> Self;
 
     /// Whether it holds what lies so far from the place.
     fn holds<S: Lanes>(&self, simd: S, apart: [S::f32s; 3]) -> S::mask32s;
@@ -24,8 +30,20 @@ pub(super) trait Kernel: Copy {
 /// All within a radius: the point estimate \[Jensen98\].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ball<'a> {
-    pub radius: f32,
-    pub points: &'a Points,
+    radius: f32,
+    flat: Flat,
+    /// About the axis along which it is flattened.
+    frame: Frame,
+    /// By which points are turned.
+    number: usize,
+    points: &'a Points,
+}
+
+impl<'a> Ball<'a> {
+    /// With points that lie otherwise for each of some numbers, so that what they miss has no direction.
+    pub fn new(radius: f32, number: usize, points: &'a Points) -> Self {
+        Self { radius, flat: Flat::ROUND, frame: points.turns[number % TURNS], number, points }
+    }
 }
 
 impl Kernel for Ball<'_> {
@@ -33,24 +51,36 @@ impl Kernel for Ball<'_> {
         Vec3::splat(self.radius)
     }
 
+    fn squared_reach(&self) -> Mat3 {
+        (Mat3::IDENTITY - self.flat.lost()) * self.radius.powi(2)
+    }
+
     fn volume(&self) -> f32 {
-        4.0 / 3.0 * PI * self.radius.powi(3)
+        4.0 / 3.0 * PI * self.radius.powi(3) * self.flat.share
     }
 
     #[inline(always)]
-    fn holds<S: Lanes>(&self, simd: S, [x, y, z]: [S::f32s; 3]) -> S::mask32s {
-        (x * x + y * y + z * z).simd_lt(S::f32s::splat(simd, self.radius * self.radius))
+    fn flattened(self, axis: Vec3, share: f32) -> Self {
+        Self { flat: Flat { axis, share }, frame: self.points.turned(axis, self.number), ..self }
+    }
+
+    #[inline(always)]
+    fn holds<S: Lanes>(&self, simd: S, apart: [S::f32s; 3]) -> S::mask32s {
+        let [x, y, z] = apart;
+        let squared = x * x + y * y + z * z + self.flat.lost_squared(simd, apart);
+        squared.simd_lt(S::f32s::splat(simd, self.radius * self.radius))
     }
 
     #[inline(always)]
     fn points<S: Lanes>(&self, simd: S, first: usize) -> [S::f32s; 3] {
-        let Points { ball: [x, y, z], .. } = self.points;
+        let Points { ball: [a, b, c], .. } = self.points;
         let range = first..first + S::WIDTH;
-        [
-            S::f32s::from_slice(simd, &x[range.clone()]) * self.radius,
-            S::f32s::from_slice(simd, &y[range.clone()]) * self.radius,
-            S::f32s::from_slice(simd, &z[range]) * self.radius,
-        ]
+        let a = S::f32s::from_slice(simd, &a[range.clone()]);
+        let b = S::f32s::from_slice(simd, &b[range.clone()]);
+        let c = S::f32s::from_slice(simd, &c[range]);
+        let Frame { u, v, w } = self.frame;
+        let (u, v, w) = (u * self.radius, v * self.radius, w * (self.radius * self.flat.share));
+        [a * u.x + b * v.x + c * w.x, a * u.y + b * v.y + c * w.y, a * u.z + b * v.z + c * w.z]
     }
 }
 
@@ -59,10 +89,18 @@ impl Kernel for Ball<'_> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slice<'a> {
     /// Along the ray.
-    pub width: f32,
-    /// About the ray's direction.
-    pub frame: Frame,
-    pub points: &'a Points,
+    width: f32,
+    flat: Flat,
+    /// About the ray's direction; its first tangent is the axis along which the slice is flattened.
+    frame: Frame,
+    points: &'a Points,
+}
+
+impl<'a> Slice<'a> {
+    /// With points that lie otherwise for each of some numbers.
+    pub fn new(width: f32, direction: Vec3, number: usize, points: &'a Points) -> Self {
+        Self { width, flat: Flat::ROUND, frame: points.turned(direction, number), points }
+    }
 }
 
 impl Kernel for Slice<'_> {
@@ -71,15 +109,30 @@ impl Kernel for Slice<'_> {
         (Vec3::ONE - along * along).max(Vec3::ZERO).map(f32::sqrt) + along * (0.5 * self.width)
     }
 
+    fn squared_reach(&self) -> Mat3 {
+        let along = square(self.frame.w) * (1.0 - 0.25 * self.width.powi(2));
+        Mat3::IDENTITY - along - self.flat.lost()
+    }
+
     fn volume(&self) -> f32 {
-        PI * self.width
+        PI * self.width * self.flat.share
     }
 
     #[inline(always)]
-    fn holds<S: Lanes>(&self, simd: S, [x, y, z]: [S::f32s; 3]) -> S::mask32s {
-        let d = self.frame.w;
+    fn flattened(self, axis: Vec3, share: f32) -> Self {
+        // The cut of an ellipsoid across the ray.
+        let w = self.frame.w;
+        let across = axis - w * axis.dot(w);
+        let Some(u) = across.try_normalize() else { return self };
+        let share = (1.0 + (share.powi(-2) - 1.0) * across.length_squared()).sqrt().recip();
+        Self { flat: Flat { axis: u, share }, frame: Frame { u, v: w.cross(u), w }, ..self }
+    }
+
+    #[inline(always)]
+    fn holds<S: Lanes>(&self, simd: S, apart: [S::f32s; 3]) -> S::mask32s {
+        let ([x, y, z], d) = (apart, self.frame.w);
         let along = x * d.x + y * d.y + z * d.z;
-        let aside = x * x + y * y + z * z - along * along;
+        let aside = x * x + y * y + z * z - along * along + self.flat.lost_squared(simd, apart);
         // Half open, so that no photon counts in two steps.
         let half = 0.5 * self.width;
         aside.simd_lt(S::f32s::splat(simd, 1.0))
@@ -93,37 +146,96 @@ impl Kernel for Slice<'_> {
         let a = S::f32s::from_slice(simd, &a[first..first + S::WIDTH]);
         let b = S::f32s::from_slice(simd, &b[first..first + S::WIDTH]);
         let Frame { u, v, .. } = self.frame;
+        let u = u * self.flat.share;
         [a * u.x + b * v.x, a * u.y + b * v.y, a * u.z + b * v.z]
     }
 }
 
-/// Points of the unit ball and of the unit disk.
+/// How a round part of space is pressed together along an axis.
+#[derive(Clone, Copy, Debug)]
+struct Flat {
+    /// Of length 1, unless nothing is pressed.
+    axis: Vec3,
+    /// How far it reaches along the axis over how far it reaches across.
+    share: f32,
+}
+
+impl Flat {
+    const ROUND: Self = Self { axis: Vec3::ZERO, share: 1.0 };
+
+    /// What it takes from the squared reach of a part of space of radius 1.
+    fn lost(&self) -> Mat3 {
+        square(self.axis) * (1.0 - self.share.powi(2))
+    }
+
+    /// What it has taken from the squared length that a vector would have in the round.
+    #[inline(always)]
+    fn lost_squared<S: Lanes>(&self, simd: S, [x, y, z]: [S::f32s; 3]) -> S::f32s {
+        let along = x * self.axis.x + y * self.axis.y + z * self.axis.z;
+        along * along * S::f32s::splat(simd, self.share.powi(-2) - 1.0)
+    }
+}
+
+/// Products of a vector's coordinates.
+fn square(v: Vec3) -> Mat3 {
+    Mat3::from_cols(v * v.x, v * v.y, v * v.z)
+}
+
+/// Points of the unit ball and of the unit disk. Planes across the last axis of the ball, and lines across the first of the
+/// disk, have as many points on one side as they have volume there, to half a point.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Points {
     ball: [[f32; MOST_LANES]; 3],
     disk: [[f32; MOST_LANES]; 2],
+    /// Turned this way and that, evenly.
+    turns: [Frame; TURNS],
+    /// Cosines and sines of turns about an axis.
+    angles: [[f32; 2]; TURNS],
 }
 
-/// The shares of the volume within which the points on a spiral lie, by which their second moments are those of the whole.
-const SHARES_OF_BALL: [u8; MOST_LANES / 2] = [0, 2, 4, 7, 6, 5, 3, 1];
-const SHARES_OF_DISK: [u8; MOST_LANES / 2] = [0, 3, 6, 2, 5, 1, 4, 7];
+/// Ways in which points are turned.
+const TURNS: usize = 64;
+
+/// In which order the points' distances from the axis go, by which their second moments are those of the whole.
+const ORDER_IN_BALL: [u8; MOST_LANES / 2] = [7, 1, 3, 5, 0, 2, 6, 4];
+const ORDER_IN_DISK: [u8; MOST_LANES / 2] = [1, 4, 7, 5, 3, 0, 6, 2];
 
 impl Points {
     pub fn new() -> Self {
-        let mut points = Self { ball: [[0.0; MOST_LANES]; 3], disk: [[0.0; MOST_LANES]; 2] };
+        let angle = |turn: f32| (2.0 * PI * turn).sin_cos();
+        let mut points = Self {
+            ball: [[0.0; MOST_LANES]; 3],
+            disk: [[0.0; MOST_LANES]; 2],
+            turns: std::array::from_fn(|i| {
+                // An axis on a spiral, and an angle about it, both from steps that fill the square.
+                let z = 1.0 - (2 * i + 1) as f32 / TURNS as f32;
+                let (sin, cos) = angle(0.618_034 * i as f32);
+                let across = (1.0 - z * z).sqrt();
+                let Frame { u, v, w } = Frame::around(Vec3::new(across * cos, across * sin, z));
+                let (sin, cos) = angle(0.754_877_7 * i as f32);
+                Frame { u: u * cos + v * sin, v: v * cos - u * sin, w }
+            }),
+            angles: std::array::from_fn(|i| {
+                let (sin, cos) = angle(i as f32 / TURNS as f32);
+                [cos, sin]
+            }),
+        };
         let pairs = MOST_LANES / 2;
         for pair in 0..pairs {
-            let share = |i: f32| (i + 0.5) / pairs as f32;
-            // A golden-angle spiral over one half of the sphere of directions.
+            let share = |i: usize| (i as f32 + 0.5) / pairs as f32;
+            let within = |order: [u8; MOST_LANES / 2]| share(usize::from(order[pair]));
+            // Between -c and c lie (3 c - c^3) / 2 of a ball: the root in trigonometric form.
+            let c = 2.0 * (share(pair).asin() / 3.0).sin();
             let (sin, cos) = (pair as f32 * PI * (3.0 - 5.0_f32.sqrt())).sin_cos();
-            let (height, within) = (share(pair as f32), share(f32::from(SHARES_OF_BALL[pair])));
-            let across = (1.0 - height * height).sqrt();
-            let in_ball = Vec3::new(across * cos, across * sin, height) * within.cbrt();
-            let (sin, cos) = (PI * share(pair as f32)).sin_cos();
-            let within = share(f32::from(SHARES_OF_DISK[pair]));
-            let in_disk = [cos, sin].map(|x| x * within.sqrt());
+            let aside = ((1.0 - c * c) * within(ORDER_IN_BALL)).sqrt();
+            // Between -sin(t) and sin(t) lie (2 t + sin(2 t)) / pi of a disk, which has no root in closed form.
+            let mut t = 0.5 * PI * share(pair);
+            for _ in 0..8 {
+                t -= (2.0 * t + (2.0 * t).sin() - PI * share(pair)) / (2.0 + 2.0 * (2.0 * t).cos());
+            }
+            let in_disk = [t.sin(), t.cos() * (2.0 * within(ORDER_IN_DISK) - 1.0)];
             for (point, sign) in [(2 * pair, 1.0), (2 * pair + 1, -1.0)] {
-                for (axis, x) in points.ball.iter_mut().zip(in_ball.to_array()) {
+                for (axis, x) in points.ball.iter_mut().zip([aside * cos, aside * sin, c]) {
                     axis[point] = sign * x;
                 }
                 for (axis, x) in points.disk.iter_mut().zip(in_disk) {
@@ -132,6 +244,13 @@ impl Points {
             }
         }
         points
+    }
+
+    /// A frame about an axis, turned in one of several ways.
+    fn turned(&self, axis: Vec3, number: usize) -> Frame {
+        let Frame { u, v, w } = Frame::around(axis);
+        let [cos, sin] = self.angles[number % TURNS];
+        Frame { u: u * cos + v * sin, v: v * cos - u * sin, w }
     }
 }
 

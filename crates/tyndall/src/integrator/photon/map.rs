@@ -4,6 +4,7 @@ use super::chunk::Chunk;
 use super::grid::CellGrid;
 use super::kernel::Points;
 use crate::math::{DVec3, Vec3, cast};
+use crate::medium::Medium;
 use crate::scene::Estimate;
 use rayon::prelude::*;
 
@@ -26,6 +27,8 @@ pub(super) struct PhotonMap {
     pub(super) red: Vec<f32>,
     pub(super) green: Vec<f32>,
     pub(super) blue: Vec<f32>,
+    /// One over the opacity where the photon is.
+    pub(super) per_opacity: Vec<f32>,
 }
 
 /// Chunks of one light, with what their photons' flux is to be multiplied by.
@@ -35,15 +38,15 @@ pub(super) struct Lit<'a> {
 }
 
 /// Bytes of a photon in the map, and of its sorting key.
-pub(super) const BYTES: u64 = 28 + 8;
+pub(super) const BYTES: u64 = 32 + 8;
 
 /// Bits of a sorting key for the place in a chunk, then for the chunk, then for the cell.
 const PLACE_BITS: u32 = 20;
 const CHUNK_BITS: u32 = 20;
 
 impl PhotonMap {
-    /// Sorts the photons of all lights.
-    pub fn new(grid: CellGrid, radius: f32, estimate: Estimate, lights: &[Lit]) -> Self {
+    /// Sorts the photons of all lights; `radius` in world units.
+    pub fn new(medium: &Medium, grid: CellGrid, radius: f32, estimate: Estimate, lights: &[Lit]) -> Self {
         let chunks: Vec<(&Chunk, DVec3)> =
             lights.iter().flat_map(|lit| lit.chunks.iter().map(|chunk| (chunk, lit.scale))).collect();
         assert!(chunks.len() < 1 << CHUNK_BITS, "{} chunks", chunks.len());
@@ -83,17 +86,20 @@ impl PhotonMap {
             red: vec![0.0; room],
             green: vec![0.0; room],
             blue: vec![0.0; room],
+            per_opacity: vec![0.0; room],
         };
         let places = (&mut map.x, &mut map.y, &mut map.z, &mut map.directions);
-        let colors = (&mut map.red, &mut map.green, &mut map.blue);
-        let ((x, y, z, directions), (red, green, blue)) = (places, colors);
-        (&keys, x, y, z, directions, red, green, blue).into_par_iter().for_each(
-            |(key, x, y, z, direction, red, green, blue)| {
+        let weights = (&mut map.red, &mut map.green, &mut map.blue, &mut map.per_opacity);
+        let ((x, y, z, directions), (red, green, blue, per_opacity)) = (places, weights);
+        (&keys, x, y, z, directions, red, green, blue, per_opacity).into_par_iter().for_each(
+            |(key, x, y, z, direction, red, green, blue, per_opacity)| {
                 let (chunk, scale) =
                     chunks[cast::low_u32(key >> PLACE_BITS & ((1 << CHUNK_BITS) - 1)) as usize];
                 let photon = chunk.photons()[cast::low_u32(key & ((1 << PLACE_BITS) - 1)) as usize];
                 [*x, *y, *z] = grid.to_metric(photon.index_place()).to_array();
                 *direction = photon.direction.word();
+                let value = medium.volume().value(photon.index_place());
+                *per_opacity = medium.transfer().opacity(value).recip();
                 let flux = Vec3::from_array(photon.whole_flux().to_array()).as_dvec3() * scale;
                 [*red, *green, *blue] = flux.to_array().map(cast::single);
             },
@@ -103,7 +109,7 @@ impl PhotonMap {
 
     /// Bytes kept.
     pub fn bytes(&self) -> usize {
-        4 * (7 * self.x.len() + self.starts.len())
+        4 * (8 * self.x.len() + self.starts.len())
     }
 
     /// The range of photons in the cells of a row, which lie side by side.

@@ -5,6 +5,9 @@
 //! every albedo but 1, and at the skin of matter, where half of the sphere holds none. Here fluence is taken to be linear
 //! about the place, `a + b x`, and fitted to the flux and its first moment, as local regression does at a border \[Fan92\]:
 //! with the moments `m0`, `m1`, `m2` of the extinction that is `a = sum (1 - c x) flux / (m0 - c m1)`, `c = m2^-1 m1`.
+//!
+//! Matter denser than the place counts as dense as the place, and its photons for so much less: else what the points miss of a
+//! dense neighbour, and the flux there, would light up all the thin matter about it.
 
 use super::kernel::Kernel;
 use crate::math::{Mat3, Vec3};
@@ -29,6 +32,8 @@ pub(super) struct Matter {
     pub opacity: f32,
     /// A photon's weight falls by so much per radius.
     pub slope: Vec3,
+    /// Its centre, metric.
+    pub lean: Vec3,
 }
 
 impl Matter {
@@ -47,6 +52,7 @@ impl Matter {
         let (mut xx, mut yy, mut zz) = (zero, zero, zero);
         let (mut xy, mut xz, mut yz) = (zero, zero, zero);
         let Mat3 { x_axis: i, y_axis: j, z_axis: k } = *to_index;
+        let most = S::f32s::splat(simd, own);
         let mut first = 0;
         while first < MOST_LANES {
             let [x, y, z] = kernel.points(simd, first);
@@ -58,7 +64,8 @@ impl Matter {
             let inside = medium.contains_lanes(simd, about);
             let value = medium.volume().value_lanes(simd, about);
             notes.values_about(simd, lane, inside, value);
-            let opacity = inside.select(medium.transfer().opacity_lanes(simd, value), zero);
+            let opacity = medium.transfer().opacity_lanes(simd, value).min(most);
+            let opacity = inside.select(opacity, zero);
             let (ox, oy, oz) = (opacity * x, opacity * y, opacity * z);
             (sum, sx, sy, sz) = (sum + opacity, sx + ox, sy + oy, sz + oz);
             (xx, yy, zz) = (ox.mul_add(x, xx), oy.mul_add(y, yy), oz.mul_add(z, zz));
@@ -68,7 +75,7 @@ impl Matter {
         // The place itself is one of the points: there is matter, but for rounding.
         let mean = (total(sum.as_slice()) + own) / (MOST_LANES + 1) as f32;
         if mean < LEAST_OPACITY {
-            return Self { opacity: 0.0, slope: Vec3::ZERO };
+            return Self { opacity: 0.0, slope: Vec3::ZERO, lean: Vec3::ZERO };
         }
         // Over the mean, which may be small, and its powers smaller than any number.
         let per_mean = 1.0 / (mean * (MOST_LANES + 1) as f32);
@@ -76,15 +83,10 @@ impl Matter {
         let lean = Vec3::new(moment(sx.as_slice()), moment(sy.as_slice()), moment(sz.as_slice()));
         let (xx, yy, zz) = (moment(xx.as_slice()), moment(yy.as_slice()), moment(zz.as_slice()));
         let (xy, xz, yz) = (moment(xy.as_slice()), moment(xz.as_slice()), moment(yz.as_slice()));
-        let least = LEAST_SPREAD * kernel.reach().length_squared() / 3.0;
-        let spread = Mat3::from_cols(
-            Vec3::new(xx + least, xy, xz),
-            Vec3::new(xy, yy + least, yz),
-            Vec3::new(xz, yz, zz + least),
-        );
-        let slope = spread.inverse() * lean;
+        let spread = Mat3::from_cols(Vec3::new(xx, xy, xz), Vec3::new(xy, yy, yz), Vec3::new(xz, yz, zz));
+        let slope = (spread + kernel.squared_reach() * LEAST_SPREAD).inverse() * lean;
         let slope = slope * (MOST_LEAN / slope.dot(lean).max(MOST_LEAN));
-        Self { opacity: mean * (1.0 - slope.dot(lean)), slope }
+        Self { opacity: mean * (1.0 - slope.dot(lean)), slope, lean }
     }
 }
 

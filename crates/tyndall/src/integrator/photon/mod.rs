@@ -249,5 +249,5 @@ fn sorted(scene: &Scene, radius: f32, settings: &PhotonSettings, lights: &[Light
     };
     let lit: Vec<Lit> =
         lights.iter().map(|light| Lit { chunks: &light.chunks, scale: scale(light) }).collect();
-    PhotonMap::new(cells, radius, settings.estimate, &lit)
+    PhotonMap::new(&scene.medium, cells, radius, settings.estimate, &lit)
 }

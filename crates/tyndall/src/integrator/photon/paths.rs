@@ -177,6 +177,12 @@ impl Tracer<'_> {
         &self.scene.medium
     }
 
+    /// What reading the optics of a place leaves in a history.
+    #[inline(always)]
+    pub fn read_at(&self, place: Vec3) -> Historygram {
+        self.read(self.medium().volume().value(place))
+    }
+
     /// What reading the optics of a value leaves in a history.
     #[inline(always)]
     fn read(&self, value: f32) -> Historygram {

@@ -75,11 +75,12 @@ impl Changed {
         self.marks.load(Ordering::Relaxed) > self.enough
     }
 
-    /// Marks where the interactions of a path are others than they were.
-    pub fn mark_difference(&self, old: &[Photon], new: &[Photon]) {
-        let same =
-            old.iter().zip(new).take_while(|(old, new)| bytemuck::bytes_of(*old) == bytemuck::bytes_of(*new));
-        let same = same.count();
+    /// Marks where the interactions of a path are others than they were, or lie in matter that is.
+    pub fn mark_difference(&self, old: &[Photon], new: &[Photon], matter_changed: impl Fn(&Photon) -> bool) {
+        let same = |(old, new): (&Photon, &Photon)| {
+            bytemuck::bytes_of(old) == bytemuck::bytes_of(new) && !matter_changed(new)
+        };
+        let same = old.iter().zip(new).take_while(|&pair| same(pair)).count();
         self.mark_all(&old[same..]);
         self.mark_all(&new[same..]);
     }
