@@ -110,6 +110,13 @@ impl Session {
         Some(photon.paths()[1] + self.tiles.iter().map(|tile| tile.segments()[1]).sum::<usize>())
     }
 
+    /// Places on view rays where the first sample gathered photons since the last edit, or since the beginning: what segments
+    /// cost, which hold few or many of them.
+    #[must_use]
+    pub fn gathers(&self) -> usize {
+        self.tiles.iter().map(TileState::gathers).sum()
+    }
+
     /// A copy of what the session keeps through edits beside pixels, for checks.
     #[must_use]
     pub fn snapshot(&self) -> Option<Kept> {

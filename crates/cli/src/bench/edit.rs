@@ -44,6 +44,8 @@ pub struct Cost {
     pub edit: [f64; 3],
     /// Of photons and segments that a picture from nothing computes, the share that the edit did.
     pub shares: [f64; 2],
+    /// Of the places on view rays where a picture from nothing gathers photons, the share at which the edit did.
+    pub gathers: f64,
     /// The whole from nothing with one segment per ray.
     pub plain: Option<f64>,
     /// See [`Session::kept`].
@@ -69,6 +71,7 @@ impl Edit<'_> {
             scratch.add(&live, start);
         }
         let (mut picture, mut all, mut kept) = (Vec::new(), computed(&live), live.kept());
+        let (mut all_gathers, mut gathers) = (live.gathers(), 0.0);
         let mut shares = [0.0; 2];
         let begun = Instant::now();
         let patient = |times: f64| begun.elapsed().as_secs_f64() < times * self.patience;
@@ -82,6 +85,7 @@ impl Edit<'_> {
                 let fresh = bench.render(&bench.scene(&after)?, level, 1);
                 scratch.add(&fresh, start);
                 (picture, all, kept) = (bits(&fresh), computed(&fresh), fresh.kept());
+                all_gathers = fresh.gathers();
             }
             if self.plain && (round == 0 || patient(1.0)) {
                 let start = Instant::now();
@@ -93,6 +97,7 @@ impl Edit<'_> {
             edit.add(&live, start);
             let done = computed(&live);
             shares = [0, 1].map(|i| if all[i] > 0.0 { done[i] / all[i] } else { 0.0 });
+            gathers = live.gathers() as f64 / all_gathers.max(1) as f64;
             if self.against == Against::Equal {
                 check(&bits(&live), &picture)?;
             }
@@ -101,7 +106,7 @@ impl Edit<'_> {
             }
         }
         let plain = self.plain.then(|| plain.medians()[2]);
-        Ok(Cost { scratch: scratch.medians(), edit: edit.medians(), shares, plain, kept })
+        Ok(Cost { scratch: scratch.medians(), edit: edit.medians(), shares, gathers, plain, kept })
     }
 }
 
@@ -111,14 +116,23 @@ impl Cost {
         self.scratch[2] / self.edit[2]
     }
 
-    /// Seconds that the shares computed would take if they cost their part of the whole.
+    /// Seconds that the shares computed would take if they cost their part of the whole: of photons, and of segments.
     pub fn due(&self) -> f64 {
-        self.shares[0] * self.scratch[0] + self.shares[1] * self.scratch[1]
+        self.due_for(self.shares[1])
+    }
+
+    fn due_for(&self, of_segments: f64) -> f64 {
+        self.shares[0] * self.scratch[0] + of_segments * self.scratch[1]
     }
 
     /// The speed-up if nothing cost but these.
     pub fn bound(&self) -> f64 {
         (self.scratch[0] + self.scratch[1]) / self.due().max(1e-9)
+    }
+
+    /// The same, with each segment weighed by the places in it where photons are gathered.
+    pub fn bound_by_gathers(&self) -> f64 {
+        (self.scratch[0] + self.scratch[1]) / self.due_for(self.gathers).max(1e-9)
     }
 }
 

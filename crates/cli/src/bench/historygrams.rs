@@ -72,6 +72,11 @@ fn row(table: &'static str, name: &str, cost: &Cost, paper: Option<&Paper>, want
     rows.push(if let Some(wanted) = wanted { speed_up.at_least(wanted) } else { speed_up });
     rows.push(ratio("speed-up that the shares allow", cost.bound()));
     rows.push(ratio("reached of what they allow", cost.speed_up() / cost.bound()).at_least(OF_BOUND));
+    rows.push(share("gathers made again", cost.gathers));
+    rows.push(ratio("speed-up that the gathers allow", cost.bound_by_gathers()));
+    rows.push(
+        ratio("reached of what those allow", cost.speed_up() / cost.bound_by_gathers()).at_least(OF_BOUND),
+    );
     let (factor, beside) = LATENCY;
     let due = factor * cost.due() + beside;
     rows.push(ratio("latency over 1.3 x due + 60 ms", cost.edit[2] / due).at_most(1.0));

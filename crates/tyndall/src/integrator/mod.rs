@@ -83,7 +83,10 @@ impl Integrator {
         if let Self::Photon(photon) = self {
             photon.count_anew();
         }
-        tiles.iter_mut().filter_map(|tile| tile.segments.as_mut()).for_each(|segments| segments.computed = 0);
+        tiles
+            .iter_mut()
+            .filter_map(|tile| tile.segments.as_mut())
+            .for_each(|segments| segments.computed = [0; 2]);
     }
 
     /// Makes ready what the next sample of all pixels needs; false where a stop came before.
@@ -175,7 +178,13 @@ impl TileState {
     /// Segments of its view rays, and of these the ones computed since the last edit.
     #[must_use]
     pub fn segments(&self) -> [usize; 2] {
-        self.segments.as_ref().map_or([0; 2], |segments| [segments.len(), segments.computed])
+        self.segments.as_ref().map_or([0; 2], |segments| [segments.len(), segments.computed[0]])
+    }
+
+    /// Places on its view rays where photons were gathered since the last edit.
+    #[must_use]
+    pub fn gathers(&self) -> usize {
+        self.segments.as_ref().map_or(0, |segments| segments.computed[1])
     }
 
     /// Bytes that its view rays keep.

@@ -23,8 +23,8 @@ pub(crate) struct SegmentTile {
     histories: Histories,
     /// Values that have changed since the segments were last asked, unless there was no edit.
     changed: Option<Historygram>,
-    /// Segments computed since the last edit.
-    pub computed: usize,
+    /// Segments computed since the last edit, and places in them where photons were gathered.
+    pub computed: [usize; 2],
 }
 
 /// Bytes of a segment without its Historygram.
@@ -43,7 +43,7 @@ impl SegmentTile {
             depth: vec![0.0; count],
             histories: Histories::with_len(groups, count),
             changed: None,
-            computed: 0,
+            computed: [0; 2],
         }
     }
 
@@ -73,7 +73,7 @@ impl SegmentTile {
     /// What values an edit changed; photons may have changed anywhere.
     pub fn add_change(&mut self, values: Historygram) {
         self.changed = Some(self.changed.unwrap_or_default() | values);
-        self.computed = 0;
+        self.computed = [0; 2];
     }
 
     /// Whether all changes have been asked for.
@@ -228,13 +228,14 @@ impl Kernel for Refine<'_> {
                 let mut notes = Notes { groups, bins, cells, read: [Historygram::EMPTY; MOST_LANES] };
                 let found = view.march(simd, &stretches, &mut notes);
                 for lane in 0..packet.len() {
-                    let Stretch { radiance, transmittance, depth } = found[lane];
+                    let Stretch { radiance, transmittance, depth, gathers } = found[lane];
                     let Rgb { r, g, b } = radiance;
                     segments.light[numbers[lane]] = [r, g, b, transmittance];
                     segments.depth[numbers[lane]] = depth;
                     segments.histories.set(numbers[lane], notes.read[lane]);
+                    segments.computed[1] += gathers;
                 }
-                segments.computed += packet.len();
+                segments.computed[0] += packet.len();
                 if stop.reached() {
                     return;
                 }

@@ -51,6 +51,8 @@ pub(super) struct Stretch {
     pub transmittance: f32,
     /// Sum of the distances inside the medium, weighted by what they cover.
     pub depth: f32,
+    /// Places of it where photons were gathered.
+    pub gathers: usize,
 }
 
 impl View<'_> {
@@ -65,6 +67,7 @@ impl View<'_> {
         let mut radiance = [Rgb::BLACK; MOST_LANES];
         let zero = S::f32s::splat(simd, 0.0);
         let (mut alpha, mut depth) = (zero, zero);
+        let mut gathers = [0; MOST_LANES];
         // For gathers that sort.
         let mut distances = Vec::new();
         let mut march = PacketMarch::<S>::new(simd, &self.scene.medium, &stretches.tracks, self.step);
@@ -85,6 +88,7 @@ impl View<'_> {
                         lane,
                     };
                     *radiance += self.source(simd, &here, &mut distances, notes) * covered;
+                    gathers[lane] += 1;
                 }
             }
             alpha += covered;
@@ -94,7 +98,8 @@ impl View<'_> {
         let mut found = [Stretch::default(); MOST_LANES];
         for lane in 0..S::WIDTH {
             let transmittance = 1.0 - alpha.as_slice()[lane];
-            found[lane] = Stretch { radiance: radiance[lane], transmittance, depth: depth.as_slice()[lane] };
+            let depth = depth.as_slice()[lane];
+            found[lane] = Stretch { radiance: radiance[lane], transmittance, depth, gathers: gathers[lane] };
         }
         found
     }
