@@ -238,6 +238,16 @@ fn after_any_edits_photons_and_segments_are_those_from_nothing() {
     assert!(photons.iter().chain([&none, &some]).all(|&n| n > 20), "{redone:?}");
 }
 
+/// Edits a session to a document by which some segments change and others do not, to the picture from nothing.
+#[track_caller]
+fn assert_some_segments_change(live: &mut Session, value: &Value, name: &str) {
+    live.set_scene(scene(value));
+    let found = refined(live, 1);
+    let segments = live.recomputed()[1].1;
+    assert!(segments > 0.0 && segments < 0.9, "{name}: {segments} of the segments");
+    assert!(found == refined(&mut Session::new(scene(value), THREADS.clone()), 1), "{name}");
+}
+
 /// Of many photons a few come and go, which moves sums by little where it moves them.
 #[test]
 fn few_of_many_photons_change_the_sums_beside_them() {
@@ -260,12 +270,7 @@ fn few_of_many_photons_change_the_sums_beside_them() {
         for _ in 0..3 {
             // Where a little less survives, a photon here and there goes.
             value["transfer_function"]["points"][2]["albedo"] = (0.9 - 0.01 * random.uniform()).into();
-            live.set_scene(scene(&value));
-            let found = refined(&mut live, 1);
-            let segments = live.recomputed()[1].1;
-            assert!(segments > 0.0 && segments < 0.9, "{segments}");
-            let expected = refined(&mut Session::new(scene(&value), THREADS.clone()), 1);
-            assert!(found == expected, "round {round}: {estimate}, {spatial}");
+            assert_some_segments_change(&mut live, &value, &format!("round {round}: {estimate}, {spatial}"));
         }
     }
 }
@@ -286,12 +291,7 @@ fn photons_that_stay_in_matter_that_changes() {
     refined(&mut live, 1);
     for opacity in [0.5001, 0.4999, 0.5003] {
         value["transfer_function"]["points"] = points(opacity);
-        live.set_scene(scene(&value));
-        let found = refined(&mut live, 1);
-        let segments = live.recomputed()[1].1;
-        assert!(segments > 0.0 && segments < 0.99, "{segments}");
-        let expected = refined(&mut Session::new(scene(&value), THREADS.clone()), 1);
-        assert!(found == expected, "opacity {opacity}");
+        assert_some_segments_change(&mut live, &value, &format!("opacity {opacity}"));
     }
 }
 

@@ -16,6 +16,7 @@ mod levels;
 mod lights;
 mod photon;
 mod scenes;
+mod seeds;
 mod semi_infinite;
 mod single_scattering;
 mod slab;

@@ -1,28 +1,21 @@
 //! Photon mapping against closed forms, and against `path`, which has no bias.
 //!
-//! Gathering blurs: in matter that changes little within the radius, and is thin across it, by less than a percent. Pixels
-//! share their photons, so what is certain of a picture is told by pictures of other seeds, never by its own variance.
+//! Gathering blurs: in matter that changes little within the radius, and is thin across it, by less than a percent.
 
 use crate::scenes::{Setup, blocks, henyey_greenstein, matter, volume};
+use crate::seeds::{BLOCK, Estimate, PIXELS, estimate};
 use std::f64::consts::PI;
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 use tyndall::camera::{Camera, Lens};
-use tyndall::film::Image;
 use tyndall::light::{Directional, Disk, Environment, Light, Map, PointLight, Rect, SphereLight};
 use tyndall::math::{Rgb, Vec3};
 use tyndall::medium::ClipShape;
 use tyndall::scattering::{Abc, Brdf};
 use tyndall::scene::{self, Background, IntegratorKind, PhotonSettings, Scene, SpatialHistory};
-use tyndall::session::{Budget, Session};
 use tyndall::transfer::{Grouping, Optics, Point};
 use tyndall::volume::{Grid, Space, ValueMap, Volume, Voxels};
 use tyndall_testing::Mean;
 
-/// Pictures of each estimate.
-const SEEDS: u64 = 8;
-/// Pixels along an edge of the picture, and of the blocks that are compared.
-const PIXELS: usize = 32;
-const BLOCK: usize = 8;
 /// Samples of each pixel of a `path` picture.
 const SAMPLES: u32 = 32;
 /// Share by which blur may change the mean of a picture; blocks, which it mixes, twice as much in the mean square.
@@ -40,97 +33,12 @@ const PHOTONS: PhotonSettings = PhotonSettings {
     spatial: SpatialHistory::Cells,
 };
 
-/// A picture's mean and those of its blocks, each the mean over seeds; the channels follow each other.
-struct Estimate {
-    whole: Vec<Mean>,
-    blocks: Vec<Mean>,
-}
-
-/// Means of square blocks of pixels of an edge; the channels follow each other.
-fn block_means(image: &Image, edge: usize) -> Vec<f64> {
-    let row = PIXELS / edge;
-    let mut means = vec![0.0; 3 * row * row];
-    for (i, pixel) in image.rgba.iter().enumerate() {
-        let block = i / PIXELS / edge * row + i % PIXELS / edge;
-        for channel in 0..3 {
-            means[3 * block + channel] += f64::from(pixel[channel]) / (edge * edge) as f64;
-        }
-    }
-    means
-}
-
-fn estimate(scene: &Scene, integrator: IntegratorKind, samples: u32) -> Estimate {
-    static POOL: LazyLock<Arc<rayon::ThreadPool>> =
-        LazyLock::new(|| Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap()));
-    let mut estimate = Estimate {
-        whole: vec![Mean::default(); 3],
-        blocks: vec![Mean::default(); 3 * (PIXELS / BLOCK).pow(2)],
-    };
-    for seed in 1..=SEEDS {
-        let mut scene = scene.clone();
-        (scene.render.integrator, scene.render.seed) = (integrator, seed);
-        let mut session = Session::new(scene, POOL.clone());
-        session.refine(&Budget::samples(samples));
-        let image = session.image();
-        for (means, edge) in [(&mut estimate.whole, PIXELS), (&mut estimate.blocks, BLOCK)] {
-            means.iter_mut().zip(block_means(&image, edge)).for_each(|(mean, x)| mean.push(x));
-        }
-    }
-    estimate
-}
-
 fn photons(scene: &Scene, settings: PhotonSettings) -> Estimate {
     estimate(scene, IntegratorKind::Photon(settings), 1)
 }
 
 fn path(scene: &Scene) -> Estimate {
     estimate(scene, IntegratorKind::Path, SAMPLES)
-}
-
-impl Estimate {
-    /// What is known for certain, of every block by its column and row.
-    fn exactly(blocks: impl Fn([usize; 2]) -> [f64; 3]) -> Self {
-        let row = PIXELS / BLOCK;
-        let values: Vec<f64> = (0..row * row).flat_map(|i| blocks([i % row, i / row])).collect();
-        let certain = |x: f64| Mean::from_iter([x, x]);
-        let whole = |channel: usize| {
-            certain(values.iter().skip(channel).step_by(3).sum::<f64>() / (row * row) as f64)
-        };
-        Self { whole: [0, 1, 2].map(whole).to_vec(), blocks: values.into_iter().map(certain).collect() }
-    }
-
-    /// Root of the mean square by which blocks of a channel are off beside noise, over the channel's mean.
-    fn blocks_off(&self, expected: &Self, channel: usize) -> f64 {
-        let pairs = || self.blocks.iter().zip(&expected.blocks).skip(channel).step_by(3);
-        let square = |(a, b): (&Mean, &Mean)| {
-            (a.mean() - b.mean()).powi(2) - a.variance_of_mean() - b.variance_of_mean()
-        };
-        let mean = pairs().map(square).sum::<f64>() / pairs().count() as f64;
-        mean.max(0.0).sqrt() / expected.whole[channel].mean()
-    }
-
-    /// Sharp, and off by no more than so large a share.
-    #[track_caller]
-    fn assert_near(&self, expected: &Self, bias: f64, name: &str) {
-        self.assert_within(expected, [bias, 2.0 * bias], name);
-    }
-
-    /// Sharp, and off by no more than so large a share as a whole, and in the mean square of blocks.
-    #[track_caller]
-    fn assert_within(&self, expected: &Self, [bias, of_blocks]: [f64; 2], name: &str) {
-        for channel in 0..3 {
-            let (a, b) = (&self.whole[channel], &expected.whole[channel]);
-            if b.mean() == 0.0 {
-                assert_eq!(a.mean(), 0.0, "{name}, channel {channel} is black");
-                continue;
-            }
-            let error = (a.variance_of_mean() + b.variance_of_mean()).sqrt() / b.mean();
-            let (off, blocks_off) = (a.mean() / b.mean() - 1.0, self.blocks_off(expected, channel));
-            assert!(error < 0.5 * bias, "{name}, channel {channel}: noise {error}");
-            assert!(off.abs() < bias + 3.0 * error, "{name}, channel {channel}: off by {off} +- {error}");
-            assert!(blocks_off < of_blocks, "{name}, channel {channel}: blocks off by {blocks_off}");
-        }
-    }
 }
 
 /// A cloud in [-1, 1]^3, without edges.
