@@ -28,6 +28,14 @@ impl Frame {
         }
     }
 
+    /// The frame turned about its axis by an angle of which the sine and cosine are given.
+    #[inline]
+    #[must_use]
+    pub fn turned(&self, (sin, cos): (f32, f32)) -> Self {
+        let Self { u, v, w } = *self;
+        Self { u: u * cos + v * sin, v: v * cos - u * sin, w }
+    }
+
     /// From frame coordinates to the space of the axis.
     #[inline]
     #[must_use]
@@ -53,7 +61,7 @@ mod tests {
             let z = 1.0 - 2.0 * (i as f32 + 0.5) / 200.0;
             let (s, c) = (i as f32 * 2.4).sin_cos();
             let r = (1.0 - z * z).sqrt();
-            let f = Frame::around(Vec3::new(r * c, r * s, z));
+            let f = Frame::around(Vec3::new(r * c, r * s, z)).turned((i as f32).sin_cos());
             assert!((f.u.cross(f.v) - f.w).length() < 1e-5, "{f:?}");
             assert!(f.u.dot(f.w).abs() < 1e-5 && (f.u.length() - 1.0).abs() < 1e-5, "{f:?}");
         }

@@ -68,7 +68,7 @@ impl PhotonMap {
         let mut matter = Matter::about(simd, medium, here, index, &kernel, notes);
         // World units over the mean free path.
         let thickness = self.radius * medium.density() * at.opacity;
-        if let Some((axis, share)) = flat_skin(matter.lean, kernel.reach().max_element(), thickness) {
+        if let Some((axis, share)) = flat_skin(matter.lean, kernel.radius(), thickness) {
             kernel = kernel.flattened(axis, share);
             matter = Matter::about(simd, medium, here, index, &kernel, notes);
         }

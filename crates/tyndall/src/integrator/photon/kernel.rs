@@ -8,6 +8,9 @@ use std::f32::consts::PI;
 
 /// A part of metric space about a place.
 pub(super) trait Kernel: Copy {
+    /// How far it reaches where it is not flattened: all round, or about a ray.
+    fn radius(&self) -> f32;
+
     /// How far it reaches along each axis.
     fn reach(&self) -> Vec3;
 
@@ -47,6 +50,10 @@ impl<'a> Ball<'a> {
 }
 
 impl Kernel for Ball<'_> {
+    fn radius(&self) -> f32 {
+        self.radius
+    }
+
     fn reach(&self) -> Vec3 {
         Vec3::splat(self.radius)
     }
@@ -104,6 +111,10 @@ impl<'a> Slice<'a> {
 }
 
 impl Kernel for Slice<'_> {
+    fn radius(&self) -> f32 {
+        1.0
+    }
+
     fn reach(&self) -> Vec3 {
         let along = self.frame.w.abs();
         (Vec3::ONE - along * along).max(Vec3::ZERO).map(f32::sqrt) + along * (0.5 * self.width)
@@ -189,8 +200,8 @@ pub(super) struct Points {
     disk: [[f32; MOST_LANES]; 2],
     /// Turned this way and that, evenly.
     turns: [Frame; TURNS],
-    /// Cosines and sines of turns about an axis.
-    angles: [[f32; 2]; TURNS],
+    /// Sines and cosines of turns about an axis.
+    angles: [(f32, f32); TURNS],
 }
 
 /// Ways in which points are turned.
@@ -211,14 +222,9 @@ impl Points {
                 let z = 1.0 - (2 * i + 1) as f32 / TURNS as f32;
                 let (sin, cos) = angle(0.618_034 * i as f32);
                 let across = (1.0 - z * z).sqrt();
-                let Frame { u, v, w } = Frame::around(Vec3::new(across * cos, across * sin, z));
-                let (sin, cos) = angle(0.754_877_7 * i as f32);
-                Frame { u: u * cos + v * sin, v: v * cos - u * sin, w }
+                Frame::around(Vec3::new(across * cos, across * sin, z)).turned(angle(0.754_877_7 * i as f32))
             }),
-            angles: std::array::from_fn(|i| {
-                let (sin, cos) = angle(i as f32 / TURNS as f32);
-                [cos, sin]
-            }),
+            angles: std::array::from_fn(|i| angle(i as f32 / TURNS as f32)),
         };
         let pairs = MOST_LANES / 2;
         for pair in 0..pairs {
@@ -248,9 +254,7 @@ impl Points {
 
     /// A frame about an axis, turned in one of several ways.
     fn turned(&self, axis: Vec3, number: usize) -> Frame {
-        let Frame { u, v, w } = Frame::around(axis);
-        let [cos, sin] = self.angles[number % TURNS];
-        Frame { u: u * cos + v * sin, v: v * cos - u * sin, w }
+        Frame::around(axis).turned(self.angles[number % TURNS])
     }
 }
 

@@ -32,7 +32,7 @@ pub(super) struct Matter {
     pub opacity: f32,
     /// A photon's weight falls by so much per radius.
     pub slope: Vec3,
-    /// Its centre, metric.
+    /// The mean of its places relative to the query's, metric: to where it leans.
     pub lean: Vec3,
 }
 
