@@ -80,19 +80,14 @@ impl Kernel for Ball<'_> {
 
     #[inline(always)]
     fn points<S: Lanes>(&self, simd: S, first: usize) -> [S::f32s; 3] {
-        let Points { ball: [a, b, c], .. } = self.points;
-        let range = first..first + S::WIDTH;
-        let a = S::f32s::from_slice(simd, &a[range.clone()]);
-        let b = S::f32s::from_slice(simd, &b[range.clone()]);
-        let c = S::f32s::from_slice(simd, &c[range]);
         let Frame { u, v, w } = self.frame;
-        let (u, v, w) = (u * self.radius, v * self.radius, w * (self.radius * self.flat.share));
-        [a * u.x + b * v.x + c * w.x, a * u.y + b * v.y + c * w.y, a * u.z + b * v.z + c * w.z]
+        let axes = [u * self.radius, v * self.radius, w * (self.radius * self.flat.share)];
+        placed(simd, &self.points.ball, first, axes)
     }
 }
 
-/// All that a step of a ray passes within a radius: the beam radiance estimate \[Jarosz08\], step by step. Together the steps
-/// make one beam, along which nothing is blurred.
+/// All that a piece of a ray passes within a radius: the beam radiance estimate \[Jarosz08\], piece by piece. Together the
+/// pieces make one beam.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slice<'a> {
     /// Along the ray.
@@ -107,6 +102,11 @@ impl<'a> Slice<'a> {
     /// With points that lie otherwise for each of some numbers.
     pub fn new(width: f32, direction: Vec3, number: usize, points: &'a Points) -> Self {
         Self { width, flat: Flat::ROUND, frame: points.turned(direction, number), points }
+    }
+
+    /// How far one of this width reaches along an axis, whichever way its ray goes: to the rim of its ends.
+    pub fn reach_of(width: f32) -> f32 {
+        (1.0 + 0.25 * width.powi(2)).sqrt()
     }
 }
 
@@ -144,7 +144,7 @@ impl Kernel for Slice<'_> {
         let ([x, y, z], d) = (apart, self.frame.w);
         let along = x * d.x + y * d.y + z * d.z;
         let aside = x * x + y * y + z * z - along * along + self.flat.lost_squared(simd, apart);
-        // Half open, so that no photon counts in two steps.
+        // Half open, so that no photon counts in two pieces.
         let half = 0.5 * self.width;
         aside.simd_lt(S::f32s::splat(simd, 1.0))
             & along.simd_ge(S::f32s::splat(simd, -half))
@@ -153,12 +153,8 @@ impl Kernel for Slice<'_> {
 
     #[inline(always)]
     fn points<S: Lanes>(&self, simd: S, first: usize) -> [S::f32s; 3] {
-        let Points { disk: [a, b], .. } = self.points;
-        let a = S::f32s::from_slice(simd, &a[first..first + S::WIDTH]);
-        let b = S::f32s::from_slice(simd, &b[first..first + S::WIDTH]);
-        let Frame { u, v, .. } = self.frame;
-        let u = u * self.flat.share;
-        [a * u.x + b * v.x, a * u.y + b * v.y, a * u.z + b * v.z]
+        let Frame { u, v, w } = self.frame;
+        placed(simd, &self.points.cylinder, first, [u * self.flat.share, v, w * (0.5 * self.width)])
     }
 }
 
@@ -192,12 +188,26 @@ fn square(v: Vec3) -> Mat3 {
     Mat3::from_cols(v * v.x, v * v.y, v * v.z)
 }
 
-/// Points of the unit ball and of the unit disk. Planes across the last axis of the ball, and lines across the first of the
-/// disk, have as many points on one side as they have volume there, to half a point.
+/// Points, from the `first` on, along axes.
+#[inline(always)]
+fn placed<S: Lanes>(
+    simd: S,
+    [a, b, c]: &[[f32; MOST_LANES]; 3],
+    first: usize,
+    [u, v, w]: [Vec3; 3],
+) -> [S::f32s; 3] {
+    let a = S::f32s::from_slice(simd, &a[first..first + S::WIDTH]);
+    let b = S::f32s::from_slice(simd, &b[first..first + S::WIDTH]);
+    let c = S::f32s::from_slice(simd, &c[first..first + S::WIDTH]);
+    [a * u.x + b * v.x + c * w.x, a * u.y + b * v.y + c * w.y, a * u.z + b * v.z + c * w.z]
+}
+
+/// Points of the unit ball, and of the cylinder of radius 1 from -1 to 1. Planes across the last axis of the ball, and across the
+/// first and the last of the cylinder, have as many points on one side as they have volume there, to half a point.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Points {
     ball: [[f32; MOST_LANES]; 3],
-    disk: [[f32; MOST_LANES]; 2],
+    cylinder: [[f32; MOST_LANES]; 3],
     /// Turned this way and that, evenly.
     turns: [Frame; TURNS],
     /// Sines and cosines of turns about an axis.
@@ -211,12 +221,15 @@ const TURNS: usize = 64;
 const ORDER_IN_BALL: [u8; MOST_LANES / 2] = [7, 1, 3, 5, 0, 2, 6, 4];
 const ORDER_IN_DISK: [u8; MOST_LANES / 2] = [1, 4, 7, 5, 3, 0, 6, 2];
 
+/// In which order the cylinder's points go along it.
+const ORDER_ALONG: [u8; MOST_LANES / 2] = [0, 6, 4, 2, 5, 7, 3, 1];
+
 impl Points {
     pub fn new() -> Self {
         let angle = |turn: f32| (2.0 * PI * turn).sin_cos();
         let mut points = Self {
             ball: [[0.0; MOST_LANES]; 3],
-            disk: [[0.0; MOST_LANES]; 2],
+            cylinder: [[0.0; MOST_LANES]; 3],
             turns: std::array::from_fn(|i| {
                 // An axis on a spiral, and an angle about it, both from steps that fill the square.
                 let z = 1.0 - (2 * i + 1) as f32 / TURNS as f32;
@@ -239,12 +252,13 @@ impl Points {
             for _ in 0..8 {
                 t -= (2.0 * t + (2.0 * t).sin() - PI * share(pair)) / (2.0 + 2.0 * (2.0 * t).cos());
             }
-            let in_disk = [t.sin(), t.cos() * (2.0 * within(ORDER_IN_DISK) - 1.0)];
+            let across = t.cos() * (2.0 * within(ORDER_IN_DISK) - 1.0);
+            let in_cylinder = [t.sin(), across, 2.0 * within(ORDER_ALONG) - 1.0];
             for (point, sign) in [(2 * pair, 1.0), (2 * pair + 1, -1.0)] {
                 for (axis, x) in points.ball.iter_mut().zip([aside * cos, aside * sin, c]) {
                     axis[point] = sign * x;
                 }
-                for (axis, x) in points.disk.iter_mut().zip(in_disk) {
+                for (axis, x) in points.cylinder.iter_mut().zip(in_cylinder) {
                     axis[point] = sign * x;
                 }
             }
@@ -262,29 +276,35 @@ impl Points {
 mod tests {
     use super::*;
 
-    /// Mean products of the coordinates of points.
-    fn moments<const N: usize>(points: &[[f32; MOST_LANES]; N]) -> [[f32; N]; N] {
-        let mean = |a: usize, b: usize| (0..MOST_LANES).map(|i| points[a][i] * points[b][i]).sum::<f32>();
-        std::array::from_fn(|a| std::array::from_fn(|b| mean(a, b) / MOST_LANES as f32))
+    #[test]
+    fn slices_reach_as_far_as_their_rims() {
+        let points = Points::new();
+        for width in [0.1, 1.5, 4.0] {
+            let along = |turn: usize| {
+                let slice = Slice::new(width, points.turns[turn].w, turn, &points);
+                slice.reach().max_element()
+            };
+            let most = (0..TURNS).map(along).fold(0.0, f32::max);
+            let bound = Slice::reach_of(width);
+            assert!((0.98 * bound..=bound * (1.0 + 1e-6)).contains(&most), "{width}: {most}, {bound}");
+        }
     }
 
     #[test]
-    fn points_stand_for_ball_and_disk() {
-        let points = Points::new();
-        for axis in points.ball.iter().chain(&points.disk) {
-            assert!(axis.iter().sum::<f32>().abs() < 1e-6);
-        }
-        // Of the whole ball 1/5 and of the whole disk 1/4 along each axis, nothing across.
-        for (a, row) in moments(&points.ball).iter().enumerate() {
-            for (b, &found) in row.iter().enumerate() {
-                let expected = if a == b { 0.2 } else { 0.0 };
-                assert!((found - expected).abs() < 0.01, "ball {a} {b}: {found}");
-            }
-        }
-        for (a, row) in moments(&points.disk).iter().enumerate() {
-            for (b, &found) in row.iter().enumerate() {
-                let expected = if a == b { 0.25 } else { 0.0 };
-                assert!((found - expected).abs() < 0.01, "disk {a} {b}: {found}");
+    fn points_stand_for_ball_and_cylinder() {
+        let Points { ball, cylinder, .. } = Points::new();
+        // Mean squares along each axis of the whole; products across have none.
+        for (name, points, squares) in
+            [("ball", ball, [0.2; 3]), ("cylinder", cylinder, [0.25, 0.25, 1.0 / 3.0])]
+        {
+            for a in 0..3 {
+                assert!(points[a].iter().sum::<f32>().abs() < 1e-6, "{name} {a}");
+                for b in 0..3 {
+                    let found =
+                        (0..MOST_LANES).map(|i| points[a][i] * points[b][i]).sum::<f32>() / MOST_LANES as f32;
+                    let expected = if a == b { squares[a] } else { 0.0 };
+                    assert!((found - expected).abs() < 0.01, "{name} {a} {b}: {found}");
+                }
             }
         }
     }

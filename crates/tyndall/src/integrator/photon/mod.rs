@@ -34,6 +34,7 @@ use crate::scene::{Estimate, PhotonSettings, Scene, SpatialHistory};
 use crate::simd::Level;
 use crate::transfer::HistoryGroups;
 use grid::CellGrid;
+use kernel::Slice;
 use lights::{Ground, LightPaths, Plan, sources, trace};
 use map::{Lit, PhotonMap};
 use pass::Pass;
@@ -211,9 +212,10 @@ fn step(scene: &Scene, settings: &PhotonSettings) -> f32 {
 fn cells_for(scene: &Scene, settings: &PhotonSettings, radius: f32) -> CellGrid {
     let grid = scene.medium.volume().grid();
     let radius = radius * grid.voxel_size();
-    // A step's part of a beam is a cylinder, whose corners lie outside of the sphere.
-    let half = 0.5 * step(scene, settings) / radius;
-    let reach = if settings.estimate == Estimate::Beam { (1.0 + half * half).sqrt() } else { 1.0 };
+    let reach = match settings.estimate {
+        Estimate::Beam => Slice::reach_of(view::widest(step(scene, settings), radius) / radius),
+        Estimate::Point | Estimate::Nearest(_) => 1.0,
+    };
     CellGrid::new(grid, radius, reach)
 }
 

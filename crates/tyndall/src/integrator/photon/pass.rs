@@ -81,12 +81,13 @@ impl Kernel for Refine<'_> {
             let count = pixels.len();
             for (lane, [x, y]) in pixels.enumerate() {
                 let mut stream = Stream::new(scene.render.seed, [y * scene.size[0] + x, sample, u32::MAX]);
-                let [in_x, in_y, u, v, within] = [(); 5].map(|()| stream.uniform());
+                let [in_x, in_y, u, v, within, due] = [(); 6].map(|()| stream.uniform());
                 let ray = scene.camera.ray(scene.size, [x as f32 + in_x, y as f32 + in_y], [u, v]);
                 let track = scene.medium.track(&ray, f32::INFINITY).shifted((within - 0.5) * view.step);
                 stretches.rays[lane] = ray;
                 stretches.to[lane] = track.steps(view.step);
                 stretches.tracks[lane] = track;
+                stretches.due[lane] = due;
             }
             let found = view.march(simd, &stretches, &mut ());
             for lane in 0..count {

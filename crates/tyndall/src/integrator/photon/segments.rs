@@ -156,6 +156,14 @@ fn segment_of(step: i32, per_ray: usize, count: i32) -> usize {
     usize::try_from(number).unwrap_or(0).min(per_ray - 1)
 }
 
+/// Share of a gather that is due at the beginning of a segment: even over neighbouring pixels and segments, by a lattice of
+/// irrational steps.
+fn due_in([x, y]: [u32; 2], segment: usize) -> f32 {
+    let along = crate::math::cast::fit_u32(segment).wrapping_mul(0x9e37_79b9);
+    let turn = x.wrapping_mul(0xc13f_a9a9).wrapping_add(y.wrapping_mul(0x91e1_0da5)).wrapping_add(along);
+    (turn >> 8) as f32 / (1 << 24) as f32
+}
+
 /// The ray of a pixel's segments, through its middle and the lens's.
 fn ray_of(scene: &Scene, [x, y]: [u32; 2]) -> (Ray, Track) {
     let ray = scene.camera.ray(scene.size, [x as f32 + 0.5, y as f32 + 0.5], [0.5; 2]);
@@ -222,6 +230,7 @@ impl Kernel for Refine<'_> {
                     (stretches.rays[lane], stretches.tracks[lane]) = rays[ray];
                     let count = rays[ray].1.steps(view.step);
                     [stretches.from[lane], stretches.to[lane]] = steps_of(segment, segments.per_ray, count);
+                    stretches.due[lane] = due_in(pixels[ray], segment);
                     numbers[lane] = ray * segments.per_ray + segment;
                 }
                 let bins = view.scene.medium.transfer().bins();
@@ -251,6 +260,18 @@ impl Kernel for Refine<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn gathers_are_due_evenly_over_neighbouring_pixels() {
+        for (x, y, segment) in [(0, 0, 0), (0, 0, 1), (500, 301, 6), (4000, 3, 19)] {
+            let pixels = (0..64).map(|i| [x + i % 8, y + i / 8]);
+            let mut due: Vec<f32> = pixels.map(|pixel| due_in(pixel, segment)).collect();
+            due.sort_by(f32::total_cmp);
+            for (i, due) in due.iter().enumerate() {
+                assert!((due - (i as f32 + 0.5) / 64.0).abs() < 0.06, "{i}: {due}");
+            }
+        }
+    }
 
     #[test]
     fn every_step_is_in_the_segment_that_has_it() {

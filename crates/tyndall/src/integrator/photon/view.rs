@@ -13,6 +13,16 @@ use fearless_simd::prelude::*;
 /// Transmittance below which what is behind no longer shows.
 pub(super) const OPAQUE: f32 = 1e-4;
 
+/// What a ray covers, and how many radii it passes, between two gathers at most: gathers that lie closer meet the same photons,
+/// or show so little that one stands for all of them.
+const MOST_COVERED: f32 = 1.0 / 16.0;
+const MOST_RADII: f32 = 1.5;
+
+/// Of a ray at most so much is gathered at once, with steps so long; any unit of length.
+pub(super) fn widest(step: f32, radius: f32) -> f32 {
+    step.max(MOST_RADII * radius)
+}
+
 /// What viewing reads.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View<'a> {
@@ -31,6 +41,8 @@ pub(super) struct Stretches {
     /// First step and the one after the last; lanes without a stretch have none.
     pub from: [i32; MOST_LANES],
     pub to: [i32; MOST_LANES],
+    /// Share of a gather that is due at the beginning, below 1. Evenly spread over rays they leave no bias.
+    pub due: [f32; MOST_LANES],
 }
 
 impl Default for Stretches {
@@ -40,6 +52,7 @@ impl Default for Stretches {
             tracks: [Track::default(); MOST_LANES],
             from: [0; MOST_LANES],
             to: [0; MOST_LANES],
+            due: [0.0; MOST_LANES],
         }
     }
 }
@@ -65,29 +78,45 @@ impl View<'_> {
         notes: &mut N,
     ) -> [Stretch; MOST_LANES] {
         let mut radiance = [Rgb::BLACK; MOST_LANES];
-        let zero = S::f32s::splat(simd, 0.0);
+        let (zero, one) = (S::f32s::splat(simd, 0.0), S::f32s::splat(simd, 1.0));
         let (mut alpha, mut depth) = (zero, zero);
+        let mut due = S::f32s::from_slice(simd, &stretches.due[..S::WIDTH]);
+        let gathers_per_width = self.map.map_or(0.0, |map| 1.0 / (MOST_RADII * map.radius));
         let mut gathers = [0; MOST_LANES];
         // For gathers that sort.
         let mut distances = Vec::new();
-        let mut march = PacketMarch::<S>::new(simd, &self.scene.medium, &stretches.tracks, self.step);
+        let medium = &*self.scene.medium;
+        let mut march = PacketMarch::<S>::new(simd, medium, &stretches.tracks, self.step);
         let ends = |k: &[i32; MOST_LANES]| S::i32s::from_slice(simd, &k[..S::WIDTH]);
         march.go_between(ends(&stretches.from), ends(&stretches.to));
         while let Some(sample) = march.next_noting(notes) {
             let covered = one_minus_exp(simd, sample.thickness) * (-alpha + 1.0);
+            if medium.transfer().emits() {
+                for (lane, radiance) in radiance.iter_mut().enumerate().take(S::WIDTH) {
+                    let emitted = medium.transfer().emitted(sample.value.as_slice()[lane]);
+                    *radiance += emitted * covered.as_slice()[lane];
+                }
+            }
+            // Gathers that a step is to have, at most one.
+            let share = (covered * (1.0 / MOST_COVERED)).max(sample.width * gathers_per_width).min(one);
+            due = covered.simd_gt(zero).select(due + share, due);
+            let now = due.simd_ge(one);
+            due = now.select(due - 1.0, due);
+            let weight = now.select(covered / share, zero);
+            let width = sample.width / share;
             for (lane, radiance) in radiance.iter_mut().enumerate().take(S::WIDTH) {
-                let covered = covered.as_slice()[lane];
-                if covered > 0.0 {
+                let weight = weight.as_slice()[lane];
+                if weight > 0.0 {
                     let [x, y, z] = sample.place;
                     let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
                     let here = Sample {
                         place,
                         value: sample.value.as_slice()[lane],
-                        width: sample.width.as_slice()[lane],
+                        width: width.as_slice()[lane],
                         w_out: -stretches.rays[lane].direction,
                         lane,
                     };
-                    *radiance += self.source(simd, &here, &mut distances, notes) * covered;
+                    *radiance += self.scattered(simd, &here, &mut distances, notes) * weight;
                     gathers[lane] += 1;
                 }
             }
@@ -104,9 +133,9 @@ impl View<'_> {
         found
     }
 
-    /// What a sample sends to the viewer, per unit extinction.
+    /// Light that a sample scatters to the viewer, per unit extinction.
     #[inline(always)]
-    fn source<S: Lanes>(
+    fn scattered<S: Lanes>(
         &self,
         simd: S,
         sample: &Sample,
@@ -116,10 +145,10 @@ impl View<'_> {
         let Sample { place, value, width, w_out, lane } = *sample;
         let medium = &*self.scene.medium;
         let optics = medium.transfer().optics(value);
-        let Some(map) = self.map else { return optics.emitted() };
+        let Some(map) = self.map else { return Rgb::BLACK };
         let event = medium.event(place, &optics);
         let at = Gathering { place, opacity: optics.opacity, event, w_out, width, lane };
-        optics.emitted() + map.scattered(simd, medium, &at, distances, notes)
+        map.scattered(simd, medium, &at, distances, notes)
     }
 }
 
@@ -128,7 +157,7 @@ struct Sample {
     /// Index space.
     place: Vec3,
     value: f32,
-    /// Of its step, world units.
+    /// World units of the ray that it stands for.
     width: f32,
     w_out: Vec3,
     lane: usize,
