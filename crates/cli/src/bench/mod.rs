@@ -2,6 +2,7 @@
 
 mod core;
 mod edit;
+mod gathering;
 mod growth;
 mod historygram_figures;
 mod historygrams;
@@ -98,6 +99,7 @@ const HISTORYGRAMS: &[Table] = &[
     historygram_figures::figure_8,
     historygram_figures::figure_9,
     historygram_figures::defaults,
+    gathering::estimates,
 ];
 
 /// Runs the tables and prints each as soon as it is there, or all as JSON.

@@ -26,6 +26,18 @@ pub fn index(x: f32) -> usize {
     x as usize
 }
 
+/// Nearest whole number; saturates at the ends of `u16`; NaN becomes 0.
+#[inline]
+#[must_use]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "`as` saturates, which is what is documented"
+)]
+pub fn round_u16(x: f32) -> u16 {
+    (x + 0.5) as u16
+}
+
 /// Cuts the fraction of a non-negative number off; saturates at the largest `u64`; negative numbers and NaN become 0.
 #[inline]
 #[must_use]

@@ -2,7 +2,7 @@
 //! traced again where an edit touched them.
 
 use super::histories::Histories;
-use super::paths::{Interactions, Past, Photon, Tracer};
+use super::paths::{Begun, Interactions, Past, Photon, Tracer, bounce_of};
 use super::spatial::Changed;
 use crate::math::cast;
 use crate::sampling::LightPathSampler;
@@ -127,10 +127,12 @@ impl Kernel for Update<'_> {
                         if chunk.traced { (chunk.valid(path), chunk.range(path)) } else { (0..0, 0..0) };
                     found.extend(&chunk.interactions, kept.clone());
                     let first = found.photons.len();
-                    let last = kept.clone().last();
-                    let from = last.and_then(|i| Some((chunk.photons()[i], chunk.interactions.past(i)?)));
                     let numbers = numbers(chunk.paths[path]);
-                    let past = tracer.trace(&numbers, from.as_ref().map(|(p, past)| (p, *past)), &mut found);
+                    let from = kept.clone().last().and_then(|i| {
+                        let (photon, past) = (chunk.photons()[i], chunk.interactions.past(i)?);
+                        Some(Begun { photon, bounce: bounce_of(&numbers, i - kept.start), past })
+                    });
+                    let past = tracer.trace(&numbers, from, &mut found);
                     chunk.flight.set(path, past.flight);
                     chunk.scatter.set(path, past.scatter);
                     // A gather weighs photons by the opacity where they are.

@@ -100,7 +100,7 @@ impl PhotonMap {
                 *direction = photon.direction.word();
                 let value = medium.volume().value(photon.index_place());
                 *per_opacity = medium.transfer().opacity(value).recip();
-                let flux = Vec3::from_array(photon.whole_flux().to_array()).as_dvec3() * scale;
+                let flux = Vec3::from_array(photon.flux).as_dvec3() * scale;
                 [*red, *green, *blue] = flux.to_array().map(cast::single);
             },
         );

@@ -17,10 +17,8 @@ pub(super) struct Photon {
     pub place: [f32; 3],
     /// In which it travels.
     pub direction: PackedDirection,
-    /// Flux per unit of its light's colour, times the paths of that light.
+    /// Flux per unit of its light's colour, times the paths of that light: of this interaction and those left out like it.
     pub flux: [f32; 3],
-    /// Scatterings before this interaction.
-    pub bounce: u32,
 }
 
 /// So many interactions of a path are all kept, and of the later ones fewer and fewer, with the flux of those left out: the
@@ -28,19 +26,25 @@ pub(super) struct Photon {
 const WHOLE: u32 = 4;
 
 impl Photon {
-    /// Chance of being kept.
-    fn chance(&self) -> f32 {
-        WHOLE as f32 / (self.bounce + 1).max(WHOLE) as f32
-    }
-
-    /// Flux of this interaction and those left out like it.
-    pub fn whole_flux(&self) -> Rgb {
-        Rgb::from(self.flux) / self.chance()
-    }
-
     pub fn index_place(&self) -> Vec3 {
         Vec3::from_array(self.place)
     }
+}
+
+/// Chance of an interaction being kept, by the scatterings before it.
+fn chance(bounce: u32) -> f32 {
+    WHOLE as f32 / (bounce + 1).max(WHOLE) as f32
+}
+
+/// Whether a path keeps its interaction after so many scatterings.
+fn is_kept(numbers: &LightPathSampler, bounce: u32) -> bool {
+    numbers.bounce(bounce).light_choice < chance(bounce)
+}
+
+/// Scatterings before the interaction of a path that it keeps after so many others.
+pub(super) fn bounce_of(numbers: &LightPathSampler, kept: usize) -> u32 {
+    let mut bounces = (0..).filter(|&bounce| is_kept(numbers, bounce));
+    bounces.nth(kept).unwrap_or(u32::MAX)
 }
 
 /// Interactions of a path that are kept on average if none is absorbed: of `max_scatter` the first few, and of the others the
@@ -147,6 +151,15 @@ pub(super) struct Tracer<'a> {
     pub cells: &'a [Historygram],
 }
 
+/// Where a path goes on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Begun {
+    pub photon: Photon,
+    /// Scatterings before it.
+    pub bounce: u32,
+    pub past: Past,
+}
+
 /// Light on its way between two interactions.
 struct Flight {
     ray: Ray,
@@ -193,26 +206,21 @@ impl Tracer<'_> {
     /// Traces a path, from its beginning or on from one of its interactions, and gives what the whole of it depends on: also
     /// what it did not hit.
     #[inline(always)]
-    pub fn trace(
-        &self,
-        numbers: &LightPathSampler,
-        from: Option<(&Photon, Past)>,
-        found: &mut Interactions,
-    ) -> Past {
-        let mut past = from.map_or(Past::NOTHING, |(_, past)| past);
+    pub fn trace(&self, numbers: &LightPathSampler, from: Option<Begun>, found: &mut Interactions) -> Past {
+        let mut past = from.map_or(Past::NOTHING, |from| from.past);
         let begun = match from {
-            Some((photon, _)) => self.scatter(photon, numbers, &mut past),
+            Some(Begun { photon, bounce, .. }) => self.scatter(&photon, bounce, numbers, &mut past),
             None => self.emit(numbers),
         };
         let Some(mut flight) = begun else { return past };
         while let Some(photon) = self.fly(&flight, numbers, &mut past) {
-            if numbers.bounce(photon.bounce).light_choice < photon.chance() {
+            if is_kept(numbers, flight.bounce) {
                 found.push(photon, &past);
             }
-            if photon.bounce + 1 >= self.scene.render.max_scatter {
+            if flight.bounce + 1 >= self.scene.render.max_scatter {
                 break;
             }
-            let Some(next) = self.scatter(&photon, numbers, &mut past) else { break };
+            let Some(next) = self.scatter(&photon, flight.bounce, numbers, &mut past) else { break };
             flight = next;
         }
         past
@@ -240,20 +248,25 @@ impl Tracer<'_> {
         Some(Photon {
             place: collision.place.to_array(),
             direction: PackedDirection::new(flight.ray.direction),
-            flux: flight.flux.to_array(),
-            bounce: flight.bounce,
+            flux: (flight.flux / chance(flight.bounce)).to_array(),
         })
     }
 
     /// Scatters light on, or takes it away \[Jonsson12, eq. 7\]: it survives with the chance that its brightest channel
     /// does, which depends on the place alone and not on what the path carries, so that no channel's light ends another's.
     #[inline(always)]
-    fn scatter(&self, photon: &Photon, numbers: &LightPathSampler, past: &mut Past) -> Option<Flight> {
+    fn scatter(
+        &self,
+        photon: &Photon,
+        bounce: u32,
+        numbers: &LightPathSampler,
+        past: &mut Past,
+    ) -> Option<Flight> {
         let place = photon.index_place();
         let value = self.medium().volume().value(place);
         past.scatter |= self.read(value);
         let event = self.medium().event(place, &self.medium().transfer().optics(value));
-        let u = numbers.bounce(photon.bounce);
+        let u = numbers.bounce(bounce);
         let scattered = event.sample_adjoint(-photon.direction.unpack(), u.scatter)?;
         let survival = scattered.weight.max_component().min(1.0);
         if u.roulette >= survival {
@@ -261,8 +274,8 @@ impl Tracer<'_> {
         }
         Some(Flight {
             ray: Ray::new(self.medium().volume().grid().index_to_world(place), scattered.direction),
-            flux: Rgb::from(photon.flux) * (scattered.weight / survival),
-            bounce: photon.bounce + 1,
+            flux: Rgb::from(photon.flux) * (scattered.weight * (chance(bounce) / survival)),
+            bounce: bounce + 1,
         })
     }
 }
@@ -274,9 +287,7 @@ mod tests {
     #[test]
     fn long_paths_keep_few_interactions() {
         for max_scatter in [0, 1, 4, 5, 64, 10_000] {
-            let sum: f64 = (0..max_scatter)
-                .map(|bounce| f64::from(Photon { bounce, ..Photon::zeroed() }.chance()))
-                .sum();
+            let sum: f64 = (0..max_scatter).map(|bounce| f64::from(chance(bounce))).sum();
             assert!((most_kept(max_scatter) - sum).abs() < 0.6, "{sum} of {max_scatter}");
         }
     }

@@ -5,20 +5,19 @@ use super::spatial::Changed;
 use super::view::{Notes, OPAQUE, Stretch, Stretches, View};
 use crate::film::{PixelSample, Tile};
 use crate::integrator::Stop;
-use crate::math::{Ray, Rgb};
+use crate::math::{Ray, Rgb, cast};
 use crate::medium::{MOST_LANES, Track};
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes};
 use crate::transfer::{HistoryGroups, Historygram};
+use bytemuck::{Pod, Zeroable};
 
 /// The segments of a tile's pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SegmentTile {
     /// Segments of each ray.
     per_ray: usize,
-    /// Radiance and transmittance; NaN where none is known.
-    light: Vec<[f32; 4]>,
-    depth: Vec<f32>,
+    segments: Vec<Segment>,
     /// Values that each segment read.
     histories: Histories,
     /// Values that have changed since the segments were last asked, unless there was no edit.
@@ -27,11 +26,53 @@ pub(crate) struct SegmentTile {
     pub computed: [usize; 2],
 }
 
-/// Bytes of a segment without its Historygram.
-pub(super) const BYTES: u64 = 20;
+/// What a segment shows. How much passes it and where it lies are as good as exact in 16 bits, its light in no less than 32.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+struct Segment {
+    radiance: [f32; 3],
+    /// Transmittance, in shares of [`WHOLE`].
+    transmittance: u16,
+    /// Where on average what it covers lies, in shares of [`WHOLE`] of its length.
+    depth: u16,
+}
 
-/// Transmittance of a segment that is not known.
-const UNKNOWN: [f32; 4] = [0.0, 0.0, 0.0, f32::NAN];
+/// Bytes of a segment without its Historygram.
+pub(super) const BYTES: u64 = size_of::<Segment>() as u64;
+
+/// What stands for 1; the number after it is free.
+const WHOLE: u16 = u16::MAX - 1;
+
+impl Segment {
+    /// None is known.
+    const UNKNOWN: Self = Self { radiance: [0.0; 3], transmittance: u16::MAX, depth: 0 };
+    const CLEAR: Self = Self { radiance: [0.0; 3], transmittance: WHOLE, depth: 0 };
+
+    /// A stretch from one distance to another.
+    fn new(found: &Stretch, [from, to]: [f32; 2]) -> Self {
+        let covered = 1.0 - found.transmittance;
+        let along = if covered > 0.0 { (found.depth / covered - from) / (to - from) } else { 0.0 };
+        let rounded = |share: f32| cast::round_u16(share.clamp(0.0, 1.0) * f32::from(WHOLE));
+        Self {
+            radiance: found.radiance.to_array(),
+            transmittance: rounded(found.transmittance),
+            depth: rounded(along),
+        }
+    }
+
+    fn is_known(&self) -> bool {
+        self.transmittance != u16::MAX
+    }
+
+    fn transmittance(&self) -> f32 {
+        f32::from(self.transmittance) / f32::from(WHOLE)
+    }
+
+    /// Between the distances where it begins and ends.
+    fn distance(&self, [from, to]: [f32; 2]) -> f32 {
+        from + (to - from) * (f32::from(self.depth) / f32::from(WHOLE))
+    }
+}
 
 impl SegmentTile {
     /// For so many pixels, nothing known yet.
@@ -39,8 +80,7 @@ impl SegmentTile {
         let count = pixels * per_ray;
         Self {
             per_ray,
-            light: vec![UNKNOWN; count],
-            depth: vec![0.0; count],
+            segments: vec![Segment::UNKNOWN; count],
             histories: Histories::with_len(groups, count),
             changed: None,
             computed: [0; 2],
@@ -49,21 +89,23 @@ impl SegmentTile {
 
     /// Segments in it.
     pub fn len(&self) -> usize {
-        self.light.len()
+        self.segments.len()
     }
 
     /// Bytes kept.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.light[..]) + size_of_val(&self.depth[..]) + self.histories.bytes()
+        size_of_val(&self.segments[..]) + self.histories.bytes()
     }
 
     /// Segments known here and there, with another light; and those known here alone.
     pub fn differing(&self, other: &Self) -> [usize; 2] {
         let mut counts = [0; 2];
-        for (here, there) in self.light.iter().zip(&other.light) {
-            match [here[3].is_nan(), there[3].is_nan()] {
-                [false, false] => counts[0] += usize::from(here.map(f32::to_bits) != there.map(f32::to_bits)),
-                [false, true] => counts[1] += 1,
+        for (here, there) in self.segments.iter().zip(&other.segments) {
+            match [here.is_known(), there.is_known()] {
+                [true, true] => {
+                    counts[0] += usize::from(bytemuck::bytes_of(here) != bytemuck::bytes_of(there));
+                }
+                [true, false] => counts[1] += 1,
                 _ => {}
             }
         }
@@ -87,16 +129,16 @@ impl SegmentTile {
         if !changed.is_empty() {
             for i in 0..self.len() {
                 if self.histories.get(i).meets(changed) {
-                    self.light[i] = UNKNOWN;
+                    self.segments[i] = Segment::UNKNOWN;
                 }
             }
         }
         if places.everywhere() {
-            self.light.fill(UNKNOWN);
+            self.segments.fill(Segment::UNKNOWN);
         } else if places.any() {
-            for (ray, light) in self.light.chunks_exact_mut(self.per_ray).enumerate() {
-                if light.iter().any(|l| !l[3].is_nan()) {
-                    forget_near(view, pixels[ray], places, light);
+            for (ray, segments) in self.segments.chunks_exact_mut(self.per_ray).enumerate() {
+                if segments.iter().any(Segment::is_known) {
+                    forget_near(view, pixels[ray], places, segments);
                 }
             }
         }
@@ -106,11 +148,11 @@ impl SegmentTile {
     fn missing(&self, ray: usize) -> Option<usize> {
         let mut transmittance = 1.0;
         for segment in 0..self.per_ray {
-            let [.., t] = self.light[ray * self.per_ray + segment];
-            if t.is_nan() {
+            let found = &self.segments[ray * self.per_ray + segment];
+            if !found.is_known() {
                 return Some(segment);
             }
-            transmittance *= t;
+            transmittance *= found.transmittance();
             if transmittance < OPAQUE {
                 return None;
             }
@@ -119,13 +161,16 @@ impl SegmentTile {
     }
 
     /// A ray's segments put together, front to back.
-    fn composite(&self, scene: &Scene, ray: usize, (world, track): &(Ray, Track)) -> PixelSample {
+    fn composite(&self, view: &View, ray: usize, (world, track): &(Ray, Track)) -> PixelSample {
         let (mut radiance, mut transmittance, mut depth) = (Rgb::BLACK, 1.0_f32, 0.0);
-        let segments = ray * self.per_ray..(ray + 1) * self.per_ray;
-        for (&[r, g, b, t], segment_depth) in self.light[segments.clone()].iter().zip(&self.depth[segments]) {
-            radiance += Rgb::new(r, g, b) * transmittance;
-            depth += segment_depth * transmittance;
-            transmittance *= t;
+        let count = track.steps(view.step);
+        let segments = &self.segments[ray * self.per_ray..(ray + 1) * self.per_ray];
+        for (number, segment) in segments.iter().enumerate() {
+            radiance += Rgb::from(segment.radiance) * transmittance;
+            let behind = transmittance * segment.transmittance();
+            let distance = segment.distance(ends(steps_of(number, self.per_ray, count), view.step));
+            depth += distance * (transmittance - behind);
+            transmittance = behind;
             // What lies behind does not show, and may be out of date.
             if transmittance < OPAQUE {
                 break;
@@ -134,9 +179,9 @@ impl SegmentTile {
         let alpha = 1.0 - transmittance;
         let distance = depth + alpha * track.distance(0.0);
         PixelSample {
-            radiance: radiance + scene.behind(world.direction) * transmittance,
+            radiance: radiance + view.scene.behind(world.direction) * transmittance,
             alpha,
-            depth: distance * world.direction.dot(scene.camera.view()),
+            depth: distance * world.direction.dot(view.scene.camera.view()),
         }
     }
 }
@@ -150,6 +195,11 @@ fn steps_of(segment: usize, per_ray: usize, count: i32) -> [i32; 2] {
     [border(segment), border(segment + 1)]
 }
 
+/// Where steps of a length begin and end, in units of it along the track.
+fn ends(steps: [i32; 2], step: f32) -> [f32; 2] {
+    steps.map(|k| k as f32 * step)
+}
+
 /// The segment that a step is in.
 fn segment_of(step: i32, per_ray: usize, count: i32) -> usize {
     let number = ((i64::from(step) + 1) * per_ray as i64 - 1) / i64::from(count.max(1));
@@ -159,7 +209,7 @@ fn segment_of(step: i32, per_ray: usize, count: i32) -> usize {
 /// Share of a gather that is due at the beginning of a segment: even over neighbouring pixels and segments, by a lattice of
 /// irrational steps.
 fn due_in([x, y]: [u32; 2], segment: usize) -> f32 {
-    let along = crate::math::cast::fit_u32(segment).wrapping_mul(0x9e37_79b9);
+    let along = cast::fit_u32(segment).wrapping_mul(0x9e37_79b9);
     let turn = x.wrapping_mul(0xc13f_a9a9).wrapping_add(y.wrapping_mul(0x91e1_0da5)).wrapping_add(along);
     (turn >> 8) as f32 / (1 << 24) as f32
 }
@@ -171,7 +221,7 @@ fn ray_of(scene: &Scene, [x, y]: [u32; 2]) -> (Ray, Track) {
 }
 
 /// Forgets the segments of a ray that gather where photons changed.
-fn forget_near(view: &View, pixel: [u32; 2], places: &Changed, light: &mut [[f32; 4]]) {
+fn forget_near(view: &View, pixel: [u32; 2], places: &Changed, segments: &mut [Segment]) {
     let medium = &*view.scene.medium;
     let (_, track) = ray_of(view.scene, pixel);
     let count = track.steps(view.step);
@@ -181,12 +231,12 @@ fn forget_near(view: &View, pixel: [u32; 2], places: &Changed, light: &mut [[f32
             continue;
         }
         // A step more to either side, whatever rounding says about the border.
-        let first = crate::math::cast::truncate(cell.start / view.step - 1.5).max(0);
-        let last = crate::math::cast::truncate(cell.end / view.step + 0.5).min(count - 1);
+        let first = cast::truncate(cell.start / view.step - 1.5).max(0);
+        let last = cast::truncate(cell.end / view.step + 0.5).min(count - 1);
         for k in first..=last {
-            let segment = &mut light[segment_of(k, light.len(), count)];
-            if !segment[3].is_nan() && places.near(track.at(track.midpoint(k, view.step))) {
-                *segment = UNKNOWN;
+            let segment = &mut segments[segment_of(k, segments.len(), count)];
+            if segment.is_known() && places.near(track.at(track.midpoint(k, view.step))) {
+                *segment = Segment::UNKNOWN;
             }
         }
     }
@@ -215,8 +265,8 @@ impl Kernel for Refine<'_> {
         let rays: Vec<(Ray, Track)> = pixels.iter().map(|&pixel| ray_of(view.scene, pixel)).collect();
         for (ray, _) in rays.iter().enumerate().filter(|(_, (_, track))| track.steps(view.step) == 0) {
             // Past the volume.
-            let segments = &mut segments.light[ray * segments.per_ray..(ray + 1) * segments.per_ray];
-            segments.fill([0.0, 0.0, 0.0, 1.0]);
+            let segments = &mut segments.segments[ray * segments.per_ray..(ray + 1) * segments.per_ray];
+            segments.fill(Segment::CLEAR);
         }
         // Rays that lack segments, and those that still do after a packet's turn, in the order of the pixels.
         let mut lacking: Vec<usize> =
@@ -237,12 +287,10 @@ impl Kernel for Refine<'_> {
                 let mut notes = Notes { groups, bins, cells, read: [Historygram::EMPTY; MOST_LANES] };
                 let found = view.march(simd, &stretches, &mut notes);
                 for lane in 0..packet.len() {
-                    let Stretch { radiance, transmittance, depth, gathers } = found[lane];
-                    let Rgb { r, g, b } = radiance;
-                    segments.light[numbers[lane]] = [r, g, b, transmittance];
-                    segments.depth[numbers[lane]] = depth;
+                    let steps = [stretches.from[lane], stretches.to[lane]];
+                    segments.segments[numbers[lane]] = Segment::new(&found[lane], ends(steps, view.step));
                     segments.histories.set(numbers[lane], notes.read[lane]);
-                    segments.computed[1] += gathers;
+                    segments.computed[1] += found[lane].gathers;
                 }
                 segments.computed[0] += packet.len();
                 if stop.reached() {
@@ -252,7 +300,7 @@ impl Kernel for Refine<'_> {
             lacking.retain(|&ray| segments.missing(ray).is_some());
         }
         for (ray, of_ray) in rays.iter().enumerate() {
-            tile.add(&segments.composite(view.scene, ray, of_ray));
+            tile.add(&segments.composite(&view, ray, of_ray));
         }
     }
 }
@@ -260,6 +308,25 @@ impl Kernel for Refine<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn segments_keep_what_they_show() {
+        for transmittance in [0.0, 1e-5, 0.3, 0.999, 1.0] {
+            for middle in [20.0, 21.7, 30.0] {
+                let covered = 1.0 - transmittance;
+                // Brighter than half-precision numbers are.
+                let radiance = Rgb::new(1e6, 0.0, 70_000.0);
+                let found = Stretch { radiance, transmittance, depth: covered * middle, gathers: 1 };
+                let segment = Segment::new(&found, [20.0, 30.0]);
+                assert!(segment.is_known() && Rgb::from(segment.radiance) == radiance);
+                assert!((segment.transmittance() - transmittance).abs() < 1e-5, "{transmittance}");
+                if covered > 0.0 {
+                    assert!((segment.distance([20.0, 30.0]) - middle).abs() < 1e-3, "{middle}");
+                }
+            }
+        }
+        assert!(!Segment::UNKNOWN.is_known() && Segment::CLEAR.transmittance() == 1.0);
+    }
 
     #[test]
     fn gathers_are_due_evenly_over_neighbouring_pixels() {

@@ -1,0 +1,82 @@
+//! How fast photons are gathered along view rays, and how well: the estimates against each other and against scalar code.
+
+use super::Row;
+use super::photon_scenes;
+use super::scenes::Bench;
+use super::timing::{Effort, median};
+use crate::Failure;
+use serde_json::{Value, json};
+use tyndall::scene::document;
+use tyndall::session::Session;
+use tyndall::simd::Level;
+
+const TABLE: &str = "gathering, default settings, one scattering; two threads";
+
+/// Least speed over scalar code at the same picture.
+const OVER_SCALAR: f64 = 2.5;
+
+/// A thin medium between walls, and layers with empty space between.
+pub fn estimates(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
+    let scenes =
+        [("Cornell box", photon_scenes::cornell_box(effort)?), ("CT-like", photon_scenes::ct(effort)?)];
+    let mut rows = Vec::new();
+    for (name, bench) in &scenes {
+        rows.extend(scene(name, bench, effort, level)?);
+    }
+    Ok(rows)
+}
+
+fn scene(name: &str, bench: &Bench, effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
+    let side = effort.pick(256, 64);
+    let small = json!({ "film": { "size": [side, side] }, "render": { "max_scatter": 1 } });
+    let with = |render: Value| bench.scene(&document::apply(&small, &json!({ "render": render })));
+    let paths = with(json!({ "integrator": "path" }))?;
+    let truth = picture(&bench.render(&paths, level, effort.pick(256, 16)));
+    let photons = effort.pick(1 << 20, 1 << 14);
+    let least = Level::available().first().copied().unwrap_or(level);
+    let ways = [("point", least), ("point", level), ("beam", level), ("nearest", level)];
+    let scene_of = |(estimate, _): &(&str, Level)| {
+        with(json!({ "photon": { "estimate": estimate, "photons": photons } }))
+    };
+    let scenes = ways.iter().map(scene_of).collect::<Result<Vec<_>, _>>()?;
+    let mut times = [(); 4].map(|()| Vec::new());
+    let mut errors = [0.0; 4];
+    for _ in 0..effort.rounds {
+        for (i, scene) in scenes.iter().enumerate() {
+            let session = bench.render(scene, ways[i].1, 1);
+            times[i].push(seconds(&session));
+            errors[i] = error(&picture(&session), &truth);
+        }
+    }
+    let seconds = times.map(median);
+    let mut rows = Vec::new();
+    for (i, (estimate, level)) in ways.iter().enumerate() {
+        let row = format!("{name}: {estimate}, {}", level.name());
+        let cost = |i: usize| seconds[i] * errors[i].powi(2);
+        rows.push(Row::new(TABLE, row.clone(), "segments", "s", seconds[i]));
+        rows.push(Row::new(TABLE, row.clone(), "error against path", "of mean", errors[i]));
+        if i == 1 {
+            let ratio = seconds[0] / seconds[1];
+            rows.push(Row::new(TABLE, row, "over scalar", "ratio", ratio).at_least(OVER_SCALAR));
+        } else if i > 1 {
+            rows.push(Row::new(TABLE, row, "speed at equal error, over point", "ratio", cost(1) / cost(i)));
+        }
+    }
+    Ok(rows)
+}
+
+/// That it took to gather.
+fn seconds(session: &Session) -> f64 {
+    session.spent().iter().find(|(stage, _)| *stage == "segments").map_or(0.0, |(_, seconds)| *seconds)
+}
+
+fn picture(session: &Session) -> Vec<f32> {
+    session.image().rgba.iter().flat_map(|[r, g, b, _]| [*r, *g, *b]).collect()
+}
+
+/// Root of the mean squared difference, over the mean of the truth.
+fn error(found: &[f32], truth: &[f32]) -> f64 {
+    let squares = found.iter().zip(truth).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
+    let mean = truth.iter().copied().map(f64::from).sum::<f64>() / truth.len() as f64;
+    (squares / truth.len() as f64).sqrt() / mean
+}
