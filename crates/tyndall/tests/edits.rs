@@ -197,6 +197,7 @@ fn after_any_edits_photons_and_segments_are_those_from_nothing() {
             "spatial": (["cells", "axes"][round / 6 % 2]),
             "estimate": (["point", "nearest", "beam"][round / 2 % 3]),
             "nearest": 5,
+            "gather_spacing": ([0.0, 1.5, 4.0][round / 4 % 3]),
             "histories": (["interactions", "paths"][round / 5 % 2]),
         });
         let mut live = Session::new(scene(&value), THREADS.clone());
@@ -272,6 +273,33 @@ fn few_of_many_photons_change_the_sums_beside_them() {
             value["transfer_function"]["points"][2]["albedo"] = (0.9 - 0.01 * random.uniform()).into();
             assert_some_segments_change(&mut live, &value, &format!("round {round}: {estimate}, {spatial}"));
         }
+    }
+}
+
+/// In thin fog the slices of beams reach far along the ray.
+#[test]
+fn wide_slices_ask_for_all_that_they_gather() {
+    let mut value = base("photon");
+    let point = |value: f64, opacity: f64, albedo: f64| json!({ "value": value, "opacity": opacity, "albedo": albedo });
+    let points = |albedo: f64| {
+        json!([
+            point(0.0, 0.01, 1.0),
+            point(0.59, 0.01, 1.0),
+            point(0.6, 1.0, albedo),
+            point(1.0, 1.0, albedo)
+        ])
+    };
+    value["film"]["size"] = json!([48, 40]);
+    value["camera"] = json!({ "auto": { "azimuth": 0, "elevation": 0 } });
+    value["render"]["photon"] = json!({
+        "photons": 20_000, "radius": 1.0, "segments": 20, "estimate": "beam", "gather_spacing": 4.0,
+    });
+    value["transfer_function"]["points"] = points(0.5);
+    let mut live = Session::new(scene(&value), THREADS.clone());
+    refined(&mut live, 1);
+    for albedo in [0.49, 0.5, 0.48] {
+        value["transfer_function"]["points"] = points(albedo);
+        assert_some_segments_change(&mut live, &value, &format!("albedo {albedo}"));
     }
 }
 

@@ -279,6 +279,7 @@ fn photon_settings(settings: &document::PhotonSettings) -> PhotonSettings {
         radius: settings.radius,
         segments: settings.segments,
         steps_per_voxel: settings.steps_per_voxel,
+        gather_spacing: settings.gather_spacing,
         estimate: match settings.estimate {
             document::Estimate::Point => Estimate::Point,
             document::Estimate::Nearest => Estimate::Nearest(settings.nearest),

@@ -82,6 +82,8 @@ pub struct PhotonSettings {
     pub segments: u32,
     /// Steps of a view ray in each voxel; positive.
     pub steps_per_voxel: f32,
+    /// Radii between gathers along a view ray at most; 0 gathers at every step.
+    pub gather_spacing: f32,
     /// How light is estimated from photons.
     pub estimate: Estimate,
     /// Which part of a path has a history of its own.

@@ -26,6 +26,7 @@ const PHOTONS: PhotonSettings = PhotonSettings {
     radius: 1.0,
     segments: 7,
     steps_per_voxel: 2.0,
+    gather_spacing: 1.5,
     estimate: scene::Estimate::Point,
     histories: scene::Histories::Interactions,
     history_bits: 64,
@@ -227,6 +228,24 @@ fn the_other_estimates() {
     for (name, estimate_by, radius) in [("nearest", Nearest(24), 3.0), ("beam", Beam, 1.0)] {
         let settings = PhotonSettings { estimate: estimate_by, radius, ..PHOTONS };
         estimate(&scene, IntegratorKind::Photon(settings), 1).assert_near(&exact, BIAS, name);
+    }
+}
+
+/// Most gathers of thin matter may be left out: the same photons show the same picture.
+#[test]
+fn gathers_far_apart() {
+    for estimate in [scene::Estimate::Point, scene::Estimate::Beam] {
+        let at_each_step = PhotonSettings { estimate, gather_spacing: 0.0, ..PHOTONS };
+        let exact = photons(&seen(sunny(0.8), ASIDE, Vec3::ZERO, 1.6), at_each_step);
+        for gather_spacing in [0.5, 1.5, 4.0] {
+            let settings = PhotonSettings { gather_spacing, ..at_each_step };
+            let found = photons(&seen(sunny(0.8), ASIDE, Vec3::ZERO, 1.6), settings);
+            found.assert_within(
+                &exact,
+                [0.008, 0.02],
+                &format!("{estimate:?}, {gather_spacing} radii apart"),
+            );
+        }
     }
 }
 

@@ -50,6 +50,7 @@ fn threads_and_slices_leave_no_trace() {
         radius: 1.5,
         segments: 5,
         steps_per_voxel: 2.0,
+        gather_spacing: 1.5,
         estimate: Estimate::Point,
         histories: Histories::Interactions,
         history_bits: 64,

@@ -72,7 +72,7 @@ pub fn seeds() -> &'static [Value] {
                     { "name": "lamp", "type": "point", "position": [0.0, 9.0, 0.0], "intensity": 50.0 },
                     { "type": "environment", "radiance": 0.5 } ],
                 "render": { "integrator": "photon", "max_scatter": 3, "samples": 2, "photon": {
-                    "photons": 100, "radius": 1.5, "segments": 3, "steps_per_voxel": 2.0, "estimate": "nearest",
+                    "photons": 100, "radius": 1.5, "segments": 3, "steps_per_voxel": 2.0, "gather_spacing": 1.0, "estimate": "nearest",
                     "nearest": 4, "histories": "paths", "history_bits": 32, "bins": "uniform", "spatial": "axes" } }
             }),
         ]

@@ -150,10 +150,10 @@ impl PhotonMapping {
         segments: &mut Option<SegmentTile>,
         stop: &Stop,
     ) {
-        let step = step(scene, &self.settings);
+        let (step, gather_spacing) = (step(scene, &self.settings), self.settings.gather_spacing);
         if tile.samples() > 0 {
             let map = self.pass.as_ref().and_then(|pass| pass.map.as_ref());
-            let view = View { scene, map, step };
+            let view = View { scene, map, step, gather_spacing };
             self.ground.level.run(pass::Refine { view, tile, stop });
             return;
         }
@@ -163,7 +163,7 @@ impl PhotonMapping {
             let pixels = tile.next(usize::MAX).0.len();
             SegmentTile::new(pixels, per_ray, groups.count())
         });
-        let view = View { scene, map: self.map.as_ref(), step };
+        let view = View { scene, map: self.map.as_ref(), step, gather_spacing };
         level.run(Refine { view, segments, tile, groups, cells, places: &self.places, stop });
     }
 
@@ -213,7 +213,8 @@ fn cells_for(scene: &Scene, settings: &PhotonSettings, radius: f32) -> CellGrid 
     let grid = scene.medium.volume().grid();
     let radius = radius * grid.voxel_size();
     let reach = match settings.estimate {
-        Estimate::Beam => Slice::reach_of(view::widest(step(scene, settings), radius) / radius),
+        // As wide as a step at least.
+        Estimate::Beam => Slice::reach_of((step(scene, settings) / radius).max(settings.gather_spacing)),
         Estimate::Point | Estimate::Nearest(_) => 1.0,
     };
     CellGrid::new(grid, radius, reach)

@@ -13,15 +13,9 @@ use fearless_simd::prelude::*;
 /// Transmittance below which what is behind no longer shows.
 pub(super) const OPAQUE: f32 = 1e-4;
 
-/// What a ray covers, and how many radii it passes, between two gathers at most: gathers that lie closer meet the same photons,
-/// or show so little that one stands for all of them.
+/// What a ray covers between two gathers at most, unless they lie as far apart as the settings allow: so little shows that one
+/// stands for all of it.
 const MOST_COVERED: f32 = 1.0 / 16.0;
-const MOST_RADII: f32 = 1.5;
-
-/// Of a ray at most so much is gathered at once, with steps so long; any unit of length.
-pub(super) fn widest(step: f32, radius: f32) -> f32 {
-    step.max(MOST_RADII * radius)
-}
 
 /// What viewing reads.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +25,8 @@ pub(super) struct View<'a> {
     pub map: Option<&'a PhotonMap>,
     /// World units.
     pub step: f32,
+    /// Radii between two gathers at most.
+    pub gather_spacing: f32,
 }
 
 /// Stretches of rays, one per lane.
@@ -81,7 +77,7 @@ impl View<'_> {
         let (zero, one) = (S::f32s::splat(simd, 0.0), S::f32s::splat(simd, 1.0));
         let (mut alpha, mut depth) = (zero, zero);
         let mut due = S::f32s::from_slice(simd, &stretches.due[..S::WIDTH]);
-        let gathers_per_width = self.map.map_or(0.0, |map| 1.0 / (MOST_RADII * map.radius));
+        let spacing = self.gather_spacing * self.map.map_or(0.0, |map| map.radius);
         let mut gathers = [0; MOST_LANES];
         // For gathers that sort.
         let mut distances = Vec::new();
@@ -98,7 +94,7 @@ impl View<'_> {
                 }
             }
             // Gathers that a step is to have, at most one.
-            let share = (covered * (1.0 / MOST_COVERED)).max(sample.width * gathers_per_width).min(one);
+            let share = (covered * (1.0 / MOST_COVERED)).max(sample.width / spacing).min(one);
             due = covered.simd_gt(zero).select(due + share, due);
             let now = due.simd_ge(one);
             due = now.select(due - 1.0, due);
@@ -142,10 +138,10 @@ impl View<'_> {
         distances: &mut Vec<f32>,
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
+        let Some(map) = self.map else { return Rgb::BLACK };
         let Sample { place, value, width, w_out, lane } = *sample;
         let medium = &*self.scene.medium;
         let optics = medium.transfer().optics(value);
-        let Some(map) = self.map else { return Rgb::BLACK };
         let event = medium.event(place, &optics);
         let at = Gathering { place, opacity: optics.opacity, event, w_out, width, lane };
         map.scattered(simd, medium, &at, distances, notes)

@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::shape::{
-    HistoryBits, LightSamples, MajorantCell, Nearest, Photons, Radius, Samples, ScatteringOrder, Segments,
-    StepLength, StepsPerVoxel,
+    GatherSpacing, HistoryBits, LightSamples, MajorantCell, Nearest, Photons, Radius, Samples,
+    ScatteringOrder, Segments, StepLength, StepsPerVoxel,
 };
 
 /// How the picture is computed: the method, its effort, and its own settings.
@@ -119,6 +119,10 @@ pub struct PhotonSettings {
     #[schemars(with = "StepsPerVoxel")]
     pub steps_per_voxel: f32,
 
+    /// Radii between gathers along a view ray at most; 0 gathers at every step.
+    #[schemars(with = "GatherSpacing")]
+    pub gather_spacing: f32,
+
     /// How light is estimated from photons.
     pub estimate: Estimate,
 
@@ -147,6 +151,7 @@ impl Default for PhotonSettings {
             radius: 1.5,
             segments: 7,
             steps_per_voxel: 2.0,
+            gather_spacing: 1.5,
             estimate: Estimate::default(),
             nearest: 32,
             histories: Histories::default(),

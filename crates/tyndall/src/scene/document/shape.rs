@@ -66,6 +66,8 @@ shapes! {
     Segments = { "type": "integer", "format": "uint32", "minimum": 1, "maximum": 256 };
     /// Steps per voxel.
     StepsPerVoxel = { "type": "number", "format": "float", "minimum": 0.1, "maximum": 100 };
+    /// Radii between gathers, or 0.
+    GatherSpacing = { "type": "number", "format": "float", "minimum": 0, "maximum": 4 };
     /// Bits of a Historygram: 32, 64 or 128.
     HistoryBits = { "type": "integer", "format": "uint32", "minimum": 32, "maximum": 128 };
     /// An edge in voxels, or 0.

@@ -178,8 +178,8 @@ fn what_is_left_out_has_its_default() {
                 "integrator": "path", "max_scatter": 64, "samples": 64, "seed": 0,
                 "raymarch": { "step": 0.5, "light_samples": 16 }, "path": { "majorant_cell": 8 },
                 "photon": {
-                    "photons": 1_048_576, "radius": 1.5, "segments": 7, "steps_per_voxel": 2.0, "estimate": "point",
-                    "nearest": 32, "histories": "interactions", "history_bits": 64, "bins": "quantile", "spatial": "cells"
+                    "photons": 1_048_576, "radius": 1.5, "segments": 7, "steps_per_voxel": 2.0, "gather_spacing": 1.5,
+                    "estimate": "point", "nearest": 32, "histories": "interactions", "history_bits": 64, "bins": "quantile", "spatial": "cells"
                 }
             }),
         ),
