@@ -29,7 +29,10 @@ pub struct Collision {
 
 /// What hears of all that a flight reads.
 pub(crate) trait FlightNotes {
-    /// The bounds of a cell.
+    /// Whether anybody listens.
+    const LISTENS: bool = true;
+
+    /// The majorant of a cell.
     fn cell(&mut self, cell: usize);
 
     /// The opacity of a data value.
@@ -38,6 +41,8 @@ pub(crate) trait FlightNotes {
 
 /// Nobody listens.
 impl FlightNotes for () {
+    const LISTENS: bool = false;
+
     #[inline(always)]
     fn cell(&mut self, _: usize) {}
 
@@ -58,7 +63,7 @@ impl Medium {
     }
 
     /// [`Self::free_flight`] that tells all that it reads, and that nothing else can change: the numbers that it draws depend
-    /// on the bounds of each cell that it crosses, and on no other's.
+    /// on the majorant of each cell that it crosses, and on no other's.
     #[inline]
     pub(crate) fn free_flight_noting(
         &self,
@@ -71,13 +76,13 @@ impl Medium {
     }
 
     #[inline(always)]
-    fn fly(
+    fn fly<N: FlightNotes>(
         &self,
         track: &Track,
         cells: impl Iterator<Item = CellStretch>,
         first: f32,
         stream: &mut Stream,
-        notes: &mut impl FlightNotes,
+        notes: &mut N,
     ) -> Option<Collision> {
         let mut depth = first;
         for cell in cells {
@@ -91,8 +96,8 @@ impl Medium {
                 let level = stream.uniform() * cell.most;
                 let value = self.volume.value(place);
                 notes.value(value);
-                // Below the smallest opacity the collision is real whatever stands there.
-                if level < cell.least || level < self.transfer.opacity(value) {
+                // Below the smallest opacity the collision is real whatever stands there: one look-up less.
+                if (!N::LISTENS && level < cell.least) || level < self.transfer.opacity(value) {
                     return Some(Collision { t, place, value });
                 }
                 depth = stream.exponential();

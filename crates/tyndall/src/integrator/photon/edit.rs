@@ -1,6 +1,7 @@
 //! What of light paths, photons and segments an edit leaves valid.
 
-use super::lights::{LightPaths, Plan, sources};
+use super::bounds::Bounds;
+use super::lights::{Ground, LightPaths, Plan, sources};
 use super::paths::Past;
 use super::{PhotonMapping, SegmentTile, step};
 use crate::light::Light;
@@ -53,7 +54,7 @@ impl Query {
 }
 
 /// Values that surely hold those of a bin.
-fn around(transfer: &TransferFunction, bin: usize) -> [f32; 2] {
+pub(super) fn around(transfer: &TransferFunction, bin: usize) -> [f32; 2] {
     let bins = transfer.bins();
     let lo = if bin == 0 { f32::MIN } else { bins.value(bin as f32 - 0.01) };
     let hi = if bin + 1 == ValueBins::COUNT { f32::MAX } else { bins.value(bin as f32 + 1.01) };
@@ -77,7 +78,12 @@ impl PhotonMapping {
         {
             return false;
         }
-        let query = Query::new(&self.ground.groups, old, new, difference);
+        let mut query = Query::new(&self.ground.groups, old, new, difference);
+        if !difference.transfer.opacity.is_empty() {
+            let Ground { groups, cells, bounds, .. } = &mut self.ground;
+            query.paths.flight |= bounds.raised(old.medium.majorants(), new.medium.majorants());
+            *bounds = Bounds::new(groups, cells, &new.medium);
+        }
         self.traced.store(0, Ordering::Relaxed);
         self.pass = None;
         if tiles.iter().all(|tile| tile.as_ref().is_none_or(SegmentTile::is_settled)) {

@@ -1,5 +1,6 @@
 //! The light paths of a scene: of each light equally many, so that no edit of one light changes the paths of others.
 
+use super::bounds::Bounds;
 use super::chunk::{self, Chunk, Update};
 use super::paths::{Source, Tracer};
 use super::spatial::Changed;
@@ -33,6 +34,8 @@ pub(super) struct Ground {
     pub groups: HistoryGroups,
     /// Of each majorant cell the groups of values that it can yield.
     pub cells: Vec<Historygram>,
+    /// And those that its majorant comes from.
+    pub bounds: Bounds,
     pub enclosure: Enclosure,
     pub level: Level,
 }
@@ -152,7 +155,7 @@ pub(super) fn trace<'s>(
                 source,
                 enclosure: &ground.enclosure,
                 groups: &ground.groups,
-                cells: &ground.cells,
+                bounds: &ground.bounds,
             };
             let numbers = |path| LightPathSampler::new(seed, pass, stream, path);
             let paths = ground.level.run(Update { chunk, tracer, numbers: &numbers, places });

@@ -9,6 +9,7 @@
 //! from nothing, bit for bit. The first sample of every pixel is this *base map*; later ones are refinement passes with
 //! photons of their own and a shrinking radius \[Knaus11\], and start anew after an edit.
 
+mod bounds;
 mod chunk;
 mod edit;
 mod gather;
@@ -33,6 +34,7 @@ use crate::math::DVec3;
 use crate::scene::{Estimate, PhotonSettings, Scene, SpatialHistory};
 use crate::simd::Level;
 use crate::transfer::HistoryGroups;
+use bounds::Bounds;
 use grid::CellGrid;
 use kernel::Slice;
 use lights::{Ground, LightPaths, Plan, sources, trace};
@@ -71,7 +73,8 @@ impl PhotonMapping {
         let bins = medium.transfer().bins();
         let cell_values = volume.cells_of(medium.majorants().voxels());
         let of_cell = |&[lo, hi]: &[f32; 2]| groups.between(bins.bin(lo), bins.bin(hi));
-        let cells = cell_values.ranges().iter().map(of_cell).collect();
+        let cells: Vec<_> = cell_values.ranges().iter().map(of_cell).collect();
+        let bounds = Bounds::new(&groups, &cells, medium);
         // The map's own cells: photons are added up in the order of whole cells, so that one beside a gather moves its last bit.
         let grid = cells_for(scene, &settings, settings.radius);
         // When so many photons have changed, few segments are left that gather none of them.
@@ -86,7 +89,7 @@ impl PhotonMapping {
         let lights = sources.into_iter().map(|source| LightPaths::new(source, &plan)).collect();
         Self {
             settings,
-            ground: Ground { groups, cells, enclosure: Enclosure::new(volume.grid()), level },
+            ground: Ground { groups, cells, bounds, enclosure: Enclosure::new(volume.grid()), level },
             lights,
             map: None,
             places,

@@ -1,5 +1,6 @@
 //! The photon pass: light paths, each of whose interactions knows what it depends on \[Jonsson12, sec. 3.2, 4.3.1\].
 
+use super::bounds::Bounds;
 use super::histories::Histories;
 use crate::light::{Emission, Enclosure, Light};
 use crate::math::{PackedDirection, Ray, Rgb, Vec3};
@@ -147,8 +148,7 @@ pub(super) struct Tracer<'a> {
     pub source: Source<'a>,
     pub enclosure: &'a Enclosure,
     pub groups: &'a HistoryGroups,
-    /// Of each majorant cell the groups of values that it can yield, whatever the transfer function.
-    pub cells: &'a [Historygram],
+    pub bounds: &'a Bounds,
 }
 
 /// Where a path goes on.
@@ -176,7 +176,7 @@ struct Notes<'a> {
 impl FlightNotes for Notes<'_> {
     #[inline(always)]
     fn cell(&mut self, cell: usize) {
-        self.read |= self.tracer.cells[cell];
+        self.read |= self.tracer.bounds.of(cell);
     }
 
     #[inline(always)]
