@@ -1,7 +1,7 @@
 """Light paths and segments computed again for the same result, by bits and groups of histories: python3 docs/false_positives.py
 
-Needs the release build. Each edit recolours one band of data values; printed is what was computed again in vain over all paths and
-segments, under `spatial = "cells"`, where photons that changed ask for segments too."""
+Needs the release build. Each edit recolours one band of data values, or makes it thinner by a tenth; printed is what was computed again
+in vain over all paths and segments, under `spatial = "cells"`, where photons that changed ask for segments too."""
 
 import json
 import pathlib
@@ -15,17 +15,18 @@ WARM, COLD = [0.85, 0.2, 0.15], [0.2, 0.35, 0.9]
 KINDS = [(bits, bins) for bits in (32, 64, 128) for bins in ("quantile", "uniform")]
 
 
-def ramp(color, low, high, top):
-    """Opacity that rises with the value, and a band of it in a colour."""
-    grey, opacity = [0.8] * 3, lambda value: max(0, value / top - 0.15) * 1.1
-    points = [(0.15 * top, grey), (low, grey), (low, color), (high, color), (high, grey), (top, grey)]
-    return {"points": [{"value": v, "opacity": opacity(v), "albedo": a} for v, a in points]}
+def ramp(color, share, low, high, top):
+    """Opacity that rises with the value, and a band of it in a colour and with a share of the opacity."""
+    grey, opacity = ([0.8] * 3, 1), lambda value: max(0, value / top - 0.15) * 1.1
+    band = (color, share)
+    points = [(0.15 * top, grey), (low, grey), (low, band), (high, band), (high, grey), (top, grey)]
+    return {"points": [{"value": v, "opacity": opacity(v) * s, "albedo": a} for v, (a, s) in points]}
 
 
-def scene(volume, color, band, top):
+def scene(volume, band, top):
     return {
         "volume": volume,
-        "transfer_function": ramp(color, *band, top),
+        "transfer_function": ramp(WARM, 1, *band, top),
         "film": {"size": [SIZE, SIZE]},
         "render": {"integrator": "photon", "samples": 1, "max_scatter": 2},
     }
@@ -42,12 +43,12 @@ CASES = [
 ]
 
 
-def in_vain(case, bits, bins):
+def in_vain(case, after, bits, bins):
     _, volume, band, top = case
     photon = {"photons": PHOTONS, "segments": SEGMENTS, "history_bits": bits, "bins": bins}
-    before = scene(volume, WARM, band, top)
+    before = scene(volume, band, top)
     before["render"]["photon"] = photon
-    edit = {"name": "recoloured", "patch": {"transfer_function": ramp(COLD, *band, top)}}
+    edit = {"patch": {"transfer_function": ramp(*after, *band, top)}}
     with tempfile.TemporaryDirectory() as folder:
         files = [pathlib.Path(folder, name) for name in ("scene.json", "edits.json", "stats.json")]
         files[0].write_text(json.dumps(before))
@@ -60,7 +61,8 @@ def in_vain(case, bits, bins):
     return f"{report['false_positives'] / (PHOTONS + SIZE**2 * SEGMENTS):.1%} of {all_done / (PHOTONS + SIZE**2 * SEGMENTS):.1%}"
 
 
-print("| recoloured |", " | ".join(f"{bits} {bins}" for bits, bins in KINDS), "|")
-print("| --- |" + " --- |" * len(KINDS))
-for case in CASES:
-    print(f"| {case[0]} |", " | ".join(in_vain(case, *kind) for kind in KINDS), "|", flush=True)
+for name, after in (("recoloured", (COLD, 1)), ("thinner", (WARM, 0.9))):
+    print(f"| {name} |", " | ".join(f"{bits} {bins}" for bits, bins in KINDS), "|")
+    print("| --- |" + " --- |" * len(KINDS))
+    for case in CASES:
+        print(f"| {case[0]} |", " | ".join(in_vain(case, after, *kind) for kind in KINDS), "|", flush=True)

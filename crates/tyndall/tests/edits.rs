@@ -323,6 +323,32 @@ fn photons_that_stay_in_matter_that_changes() {
     }
 }
 
+/// A flight depends on the majorant of a cell also where it meets none of the values that raise or lower it.
+#[test]
+fn majorants_that_few_values_raise_and_lower() {
+    let mut value = base("photon");
+    let point = |value: f64, opacity: f64| json!({ "value": value, "opacity": opacity });
+    // A peak that most cells' majorants come from, and a band that few cells have.
+    let band = |opacity: f64| {
+        let peak = [point(0.3, 0.2), point(0.4, 0.6), point(0.41, 0.6), point(0.45, 0.2)];
+        let band = [point(0.65, 0.2), point(0.66, opacity), point(0.68, opacity), point(0.69, 0.2)];
+        json!([peak, band].concat())
+    };
+    value["render"]["photon"] = json!({ "photons": 3000 });
+    value["render"]["path"] = json!({ "majorant_cell": 4 });
+    value["transfer_function"]["points"] = band(0.3);
+    let mut live = Session::new(scene(&value), THREADS.clone());
+    refined(&mut live, 1);
+    for opacity in [0.9, 0.7, 0.95, 0.3] {
+        value["transfer_function"]["points"] = band(opacity);
+        live.set_scene(scene(&value));
+        let found = refined(&mut live, 1);
+        let paths = live.recomputed()[0].1;
+        assert!(paths > 0.0 && paths < 1.0, "opacity {opacity}: {paths} of the paths");
+        assert!(found == refined(&mut Session::new(scene(&value), THREADS.clone()), 1), "opacity {opacity}");
+    }
+}
+
 /// Lights keep their numbers by their names, and photons are added up by these, not by the document's order.
 #[test]
 fn the_order_of_named_lights_moves_no_photon() {
