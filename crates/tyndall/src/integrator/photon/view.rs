@@ -89,8 +89,11 @@ impl View<'_> {
             let covered = one_minus_exp(simd, sample.thickness) * (-alpha + 1.0);
             if medium.transfer().emits() {
                 for (lane, radiance) in radiance.iter_mut().enumerate().take(S::WIDTH) {
-                    let emitted = medium.transfer().emitted(sample.value.as_slice()[lane]);
-                    *radiance += emitted * covered.as_slice()[lane];
+                    // Lanes that take no sample may have any value.
+                    let covered = covered.as_slice()[lane];
+                    if covered > 0.0 {
+                        *radiance += medium.transfer().emitted(sample.value.as_slice()[lane]) * covered;
+                    }
                 }
             }
             // Gathers that a step is to have, at most one.
