@@ -1,0 +1,135 @@
+//! Edits of `photon` that touch little, each where something could be overlooked.
+
+use super::{THREADS, base, refined, scene};
+use serde_json::{Value, json};
+use tyndall::session::Session;
+use tyndall_testing::SplitMix;
+
+/// Edits a session to a document by which some segments change and others do not, to the picture from nothing.
+#[track_caller]
+fn assert_some_segments_change(live: &mut Session, value: &Value, name: &str) {
+    live.set_scene(scene(value));
+    let found = refined(live, 1);
+    let segments = live.recomputed()[1].1;
+    assert!(segments > 0.0 && segments < 0.9, "{name}: {segments} of the segments");
+    assert!(found == refined(&mut Session::new(scene(value), THREADS.clone()), 1), "{name}");
+}
+
+/// Edits a session of a document from one number to others, by the points of a transfer function that each stands for.
+#[track_caller]
+fn assert_each_changes_some(
+    value: &mut Value,
+    points: impl Fn(f64) -> Value,
+    [first, others @ ..]: [f64; 4],
+) {
+    value["transfer_function"]["points"] = points(first);
+    let mut live = Session::new(scene(value), THREADS.clone());
+    refined(&mut live, 1);
+    for number in others {
+        value["transfer_function"]["points"] = points(number);
+        assert_some_segments_change(&mut live, value, &format!("{number} in place of {first}"));
+    }
+}
+
+/// Of many photons a few come and go, which moves sums by little where it moves them.
+#[test]
+fn few_of_many_photons_change_the_sums_beside_them() {
+    let mut random = SplitMix::new(7);
+    for round in 0..12 {
+        let mut value = base("photon");
+        value["transfer_function"]["points"][0]["value"] = 0.3.into();
+        value["film"]["size"] = json!([48, 40]);
+        value["render"]["max_scatter"] = 2.into();
+        value["render"]["path"] = json!({ "majorant_cell": 1 });
+        // Glowing matter would start all its photons anew.
+        value["transfer_function"]["points"][2]["emission"] = 0.into();
+        let estimate = ["point", "beam", "nearest"][round % 3];
+        let spatial = ["cells", "axes"][round / 3 % 2];
+        value["render"]["photon"] = json!({
+            "photons": 60_000, "radius": 1.0, "segments": 20, "nearest": 20, "estimate": estimate, "spatial": spatial,
+        });
+        let mut live = Session::new(scene(&value), THREADS.clone());
+        refined(&mut live, 1);
+        for _ in 0..3 {
+            // Where a little less survives, a photon here and there goes.
+            value["transfer_function"]["points"][2]["albedo"] = (0.9 - 0.01 * random.uniform()).into();
+            assert_some_segments_change(&mut live, &value, &format!("round {round}: {estimate}, {spatial}"));
+        }
+    }
+}
+
+/// In thin fog the slices of beams reach far along the ray.
+#[test]
+fn wide_slices_ask_for_all_that_they_gather() {
+    let mut value = base("photon");
+    let point = |value: f64, opacity: f64, albedo: f64| json!({ "value": value, "opacity": opacity, "albedo": albedo });
+    let points = |albedo: f64| {
+        json!([
+            point(0.0, 0.01, 1.0),
+            point(0.59, 0.01, 1.0),
+            point(0.6, 1.0, albedo),
+            point(1.0, 1.0, albedo)
+        ])
+    };
+    value["film"]["size"] = json!([48, 40]);
+    value["camera"] = json!({ "auto": { "azimuth": 0, "elevation": 0 } });
+    value["render"]["photon"] = json!({
+        "photons": 20_000, "radius": 1.0, "segments": 20, "estimate": "beam", "gather_spacing": 4.0,
+    });
+    assert_each_changes_some(&mut value, points, [0.5, 0.49, 0.5, 0.48]);
+}
+
+/// A little more or less opacity moves hardly any photon, but each weighs more or less where it lies beside thinner matter.
+#[test]
+fn photons_that_stay_in_matter_that_changes() {
+    let mut value = base("photon");
+    let point = |value: f64, opacity: f64| json!({ "value": value, "opacity": opacity });
+    let points = |opacity: f64| {
+        json!([point(0.399, 0.1), point(0.4, opacity), point(0.45, opacity), point(0.451, 1.0)])
+    };
+    value["volume"]["interpolation"] = "nearest".into();
+    value["film"]["size"] = json!([48, 40]);
+    value["render"]["photon"] = json!({ "photons": 20_000, "radius": 2.0, "segments": 20 });
+    assert_each_changes_some(&mut value, points, [0.5, 0.5001, 0.4999, 0.5003]);
+}
+
+/// A flight depends on the majorant of a cell also where it meets none of the values that raise or lower it.
+#[test]
+fn majorants_that_few_values_raise_and_lower() {
+    let mut value = base("photon");
+    let point = |value: f64, opacity: f64| json!({ "value": value, "opacity": opacity });
+    // A peak that most cells' majorants come from, and a band that few cells have.
+    let band = |opacity: f64| {
+        let peak = [point(0.3, 0.2), point(0.4, 0.6), point(0.41, 0.6), point(0.45, 0.2)];
+        let band = [point(0.65, 0.2), point(0.66, opacity), point(0.68, opacity), point(0.69, 0.2)];
+        json!([peak, band].concat())
+    };
+    value["render"]["photon"] = json!({ "photons": 3000 });
+    value["render"]["path"] = json!({ "majorant_cell": 4 });
+    value["transfer_function"]["points"] = band(0.3);
+    let mut live = Session::new(scene(&value), THREADS.clone());
+    refined(&mut live, 1);
+    for opacity in [0.9, 0.7, 0.95, 0.3] {
+        value["transfer_function"]["points"] = band(opacity);
+        live.set_scene(scene(&value));
+        let found = refined(&mut live, 1);
+        let paths = live.recomputed()[0].1;
+        assert!(paths > 0.0 && paths < 1.0, "opacity {opacity}: {paths} of the paths");
+        assert!(found == refined(&mut Session::new(scene(&value), THREADS.clone()), 1), "opacity {opacity}");
+    }
+}
+
+/// Lights keep their numbers by their names, and photons are added up by these, not by the document's order.
+#[test]
+fn the_order_of_named_lights_moves_no_photon() {
+    let mut value = base("photon");
+    value["lights"][1]["name"] = "sky".into();
+    value["render"]["photon"] = json!({ "photons": 3000 });
+    let mut live = Session::new(scene(&value), THREADS.clone());
+    let before = refined(&mut live, 1);
+    value["lights"].as_array_mut().unwrap().reverse();
+    live.set_scene(scene(&value));
+    assert!(refined(&mut live, 1) == before);
+    assert!(live.recomputed().iter().all(|(_, share)| *share == 0.0), "{:?}", live.recomputed());
+    assert!(refined(&mut Session::new(scene(&value), THREADS.clone()), 1) == before);
+}
