@@ -29,9 +29,6 @@ pub struct Collision {
 
 /// What hears of all that a flight reads.
 pub(crate) trait FlightNotes {
-    /// Whether anybody listens.
-    const LISTENS: bool = true;
-
     /// The majorant of a cell.
     fn cell(&mut self, cell: usize);
 
@@ -41,8 +38,6 @@ pub(crate) trait FlightNotes {
 
 /// Nobody listens.
 impl FlightNotes for () {
-    const LISTENS: bool = false;
-
     #[inline(always)]
     fn cell(&mut self, _: usize) {}
 
@@ -76,13 +71,13 @@ impl Medium {
     }
 
     #[inline(always)]
-    fn fly<N: FlightNotes>(
+    fn fly(
         &self,
         track: &Track,
         cells: impl Iterator<Item = CellStretch>,
         first: f32,
         stream: &mut Stream,
-        notes: &mut N,
+        notes: &mut impl FlightNotes,
     ) -> Option<Collision> {
         let mut depth = first;
         for cell in cells {
@@ -96,8 +91,7 @@ impl Medium {
                 let level = stream.uniform() * cell.most;
                 let value = self.volume.value(place);
                 notes.value(value);
-                // Below the smallest opacity the collision is real whatever stands there: one look-up less.
-                if (!N::LISTENS && level < cell.least) || level < self.transfer.opacity(value) {
+                if level < self.transfer.opacity(value) {
                     return Some(Collision { t, place, value });
                 }
                 depth = stream.exponential();
@@ -117,7 +111,8 @@ impl Medium {
         let mut depth = stream.exponential();
         let mut collisions = Tentative::new();
         for cell in self.majorants.walk(track) {
-            if control > ROULETTE_DEPTH {
+            // Again and again, so that it does not matter how many empty cells follow.
+            while control > ROULETTE_DEPTH {
                 if stream.uniform() >= (-ROULETTE_DEPTH).exp() {
                     return 0.0;
                 }

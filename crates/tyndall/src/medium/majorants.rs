@@ -1,7 +1,7 @@
 //! Opacity bounds per cell and the walk of a ray through the cells (3D-DDA \[Amanatides87\]).
 
-use super::{Track, reach};
-use crate::math::{Vec3, cast};
+use super::{Track, emptiness};
+use crate::math::cast;
 use crate::transfer::TransferFunction;
 use crate::volume::Volume;
 use rayon::prelude::*;
@@ -12,14 +12,12 @@ pub struct MajorantGrid {
     dims: [i32; 3],
     edge: f32,
     opacities: Vec<[f32; 2]>,
-    /// How many cells to every side hold the same single opacity: a ray crosses them in one stretch.
-    reach: Vec<u8>,
-    /// One more than the reach of an empty cell, 0 for one that holds matter; for kernels over lanes, which may read
-    /// some bytes past a cell's.
+    /// Per cell how many cells on to every side end what is empty around it, itself included, so that a ray crosses it in one
+    /// stretch; 0 where there is matter. For kernels over lanes, which may read some bytes past a cell's.
     empty: Vec<u8>,
 }
 
-/// The stretch of a track inside one cell, or inside several of the same single opacity.
+/// The stretch of a track inside one cell, or inside several empty ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CellStretch {
     /// Distance where it begins.
@@ -41,13 +39,11 @@ impl MajorantGrid {
         let cells = volume.cells_of(edge);
         let opacities: Vec<[f32; 2]> =
             cells.ranges().par_iter().map(|&values| transfer.opacity_range(values)).collect();
-        let reach = reach::reach(cells.dims(), &opacities);
-        let empty = opacities.iter().zip(&reach).map(|(o, reach)| if o[1] <= 0.0 { reach + 1 } else { 0 });
+        let empty = emptiness::extents(cells.dims(), &opacities);
         Self {
             dims: cells.dims().map(|n| cast::fit_u32(n).cast_signed()),
             edge: cells.edge() as f32,
-            empty: empty.chain([0; 3]).collect(),
-            reach,
+            empty: empty.into_iter().chain([0; 3]).collect(),
             opacities,
         }
     }
@@ -79,14 +75,15 @@ impl MajorantGrid {
         &self.empty
     }
 
-    /// The cells along a track in order, those that are alike in one stretch.
+    /// The cells along a track in order, empty ones that follow each other in one stretch as far as can be seen.
     #[inline]
     #[must_use]
     pub fn walk(&self, track: &Track) -> CellWalk<'_> {
         CellWalk::new(self, track)
     }
 
-    /// The cells along a track in order, each by itself: where stretches begin and end does not depend on what is in them.
+    /// The cells along a track in order, each by itself. Stretches with matter are those of [`Self::walk`] to the last bit, so
+    /// that what is reckoned along them does not depend on what is empty beside the way.
     #[inline]
     #[must_use]
     pub fn walk_singly(&self, track: &Track) -> CellWalk<'_, false> {
@@ -94,82 +91,139 @@ impl MajorantGrid {
     }
 }
 
-/// Goes along a track from cell to cell, at once over those that are `ALIKE` if told so; the stretches join without gaps.
+/// Goes along a track from cell to cell; if it `LEAPS`, at once over empty ones. The stretches join without gaps.
 #[derive(Clone, Debug)]
-pub struct CellWalk<'a, const ALIKE: bool = true> {
+pub struct CellWalk<'a, const LEAPS: bool = true> {
     grid: &'a MajorantGrid,
-    /// Where the track begins, and where it goes, in cells.
-    entry: Vec3,
-    direction: Vec3,
-    inverse: Vec3,
-    sign: [i32; 3],
-    /// The present cell.
-    place: [i32; 3],
-    /// Where the track leaves it along each axis.
-    next: [f32; 3],
+    axes: [Axis; 3],
     start: f32,
     length: f32,
 }
 
-impl<'a, const ALIKE: bool> CellWalk<'a, ALIKE> {
+/// What a walk knows along one axis, in cells.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    /// Where the track begins, and where it goes.
+    entry: f32,
+    direction: f32,
+    inverse: f32,
+    sign: i32,
+    /// Cells of the grid.
+    cells: i32,
+    /// The present cell.
+    place: i32,
+    /// Where the track leaves it.
+    next: f32,
+}
+
+impl Axis {
+    #[inline(always)]
+    fn new(entry: f32, direction: f32, cells: i32) -> Self {
+        let sign = i32::from(direction > 0.0) - i32::from(direction < 0.0);
+        let place = cast::floor_i32(entry).clamp(0, cells - 1);
+        let axis = Self { entry, direction, inverse: direction.recip(), sign, cells, place, next: 0.0 };
+        Self { next: axis.exit(place), ..axis }
+    }
+
+    /// Where the track leaves the cells up to `last`; the outermost reach to the track's end.
+    #[inline(always)]
+    fn exit(&self, last: i32) -> f32 {
+        let border = last + i32::from(self.sign > 0);
+        if self.sign != 0 && border > 0 && border < self.cells {
+            (border as f32 - self.entry) * self.inverse
+        } else {
+            f32::INFINITY
+        }
+    }
+
+    /// Where the track leaves the cells up to `ahead` on.
+    #[inline(always)]
+    fn exit_ahead(&self, ahead: i32) -> f32 {
+        self.exit(self.place + ahead * self.sign)
+    }
+
+    #[inline(always)]
+    fn enter(&mut self, place: i32) {
+        self.place = place;
+        self.next = self.exit(place);
+    }
+
+    /// Past exactly those borders that come before another axis's at distance `leave`; of borders at one distance those of
+    /// the `higher` axis come first, as [`nearest`] has it.
+    #[inline(always)]
+    fn leap(&mut self, leave: f32, higher: bool) {
+        if self.sign == 0 {
+            return;
+        }
+        let there = self.entry + self.direction * leave;
+        let place = cast::floor_i32(there).clamp(0, self.cells - 1);
+        let inside = there - place as f32;
+        let unsure = ROUNDING * self.cells as f32;
+        let is_sure = inside > unsure && inside < 1.0 - unsure;
+        self.enter(if is_sure { place } else { self.place_beside(place, leave, higher) });
+    }
+
+    /// [`Self::leap`] to a cell about `guess`: beside a border, a place is rounded otherwise than the distance to it, which
+    /// alone decides.
+    #[cold]
+    #[inline(never)]
+    fn place_beside(self, guess: i32, leave: f32, higher: bool) -> i32 {
+        let is_passed = |exit: f32| exit < leave || (exit == leave && higher);
+        let mut place = if (guess - self.place) * self.sign < 0 { self.place } else { guess };
+        while place != self.place && !is_passed(self.exit(place - self.sign)) {
+            place -= self.sign;
+        }
+        while is_passed(self.exit(place)) {
+            place += self.sign;
+        }
+        place
+    }
+}
+
+/// What rounding moves a place at most, for each cell along the axis: four times what the few roundings on the way to it,
+/// and to the distance of a border, can come to.
+const ROUNDING: f32 = 4e-6;
+
+impl<'a, const LEAPS: bool> CellWalk<'a, LEAPS> {
     #[inline]
     fn new(grid: &'a MajorantGrid, track: &Track) -> Self {
         let per_cell = 1.0 / grid.edge;
         let entry = track.ray.origin * per_cell;
         let direction = track.ray.direction * per_cell;
-        let along = |a: usize| cast::floor_i32(entry[a]).clamp(0, grid.dims[a] - 1);
-        let sign = |a: usize| i32::from(direction[a] > 0.0) - i32::from(direction[a] < 0.0);
-        let mut walk = Self {
-            grid,
-            entry,
-            direction,
-            inverse: Vec3::new(direction.x.recip(), direction.y.recip(), direction.z.recip()),
-            sign: [sign(0), sign(1), sign(2)],
-            place: [along(0), along(1), along(2)],
-            next: [0.0; 3],
-            start: 0.0,
-            length: track.length,
-        };
-        walk.next = walk.exits(0);
-        walk
-    }
-
-    /// Where the track leaves the cells up to `reach` away, along each axis.
-    #[inline(always)]
-    fn exits(&self, reach: i32) -> [f32; 3] {
-        let exit = |axis: usize| self.exit(axis, self.place[axis] + reach * self.sign[axis]);
-        [exit(0), exit(1), exit(2)]
-    }
-
-    /// Where the track leaves the cells up to `last` along an axis; the outermost reach to the track's end.
-    #[inline(always)]
-    fn exit(&self, axis: usize, last: i32) -> f32 {
-        let border = last + i32::from(self.sign[axis] > 0);
-        if self.sign[axis] != 0 && border > 0 && border < self.grid.dims[axis] {
-            (border as f32 - self.entry[axis]) * self.inverse[axis]
-        } else {
-            f32::INFINITY
-        }
+        let axis = |a: usize| Axis::new(entry[a], direction[a], grid.dims[a]);
+        Self { grid, axes: [axis(0), axis(1), axis(2)], start: 0.0, length: track.length }
     }
 }
 
-impl<const ALIKE: bool> Iterator for CellWalk<'_, ALIKE> {
+impl<const LEAPS: bool> Iterator for CellWalk<'_, LEAPS> {
     type Item = CellStretch;
 
     // Kernels over lanes must find it inside themselves.
     #[inline(always)]
     fn next(&mut self) -> Option<CellStretch> {
-        let (nx, ny) = (self.grid.dims[0] as isize, self.grid.dims[1] as isize);
         while self.start < self.length {
-            let [x, y, z] = self.place;
-            let (x, y, z) = (x as isize, y as isize, z as isize);
-            let cell = (x + nx * (y + ny * z)).cast_unsigned();
-            let reach = if ALIKE { i32::from(self.grid.reach[cell]) } else { 0 };
-            let (through, leave) = if reach == 0 { nearest(self.next) } else { nearest(self.exits(reach)) };
+            let [x, y, z] = &self.axes;
+            let (nx, ny) = (x.cells as isize, y.cells as isize);
+            let cell = (x.place as isize + nx * (y.place as isize + ny * z.place as isize)).cast_unsigned();
+            // Empty cells that follow on this one.
+            let ahead = if LEAPS { i32::from(self.grid.empty[cell].max(1)) - 1 } else { 0 };
+            let (through, leave) = if ahead == 0 {
+                nearest([x.next, y.next, z.next])
+            } else {
+                nearest([x.exit_ahead(ahead), y.exit_ahead(ahead), z.exit_ahead(ahead)])
+            };
             let start = self.start;
             let end = leave.min(self.length);
             if end < self.length {
-                self.step(through, leave, reach);
+                // Not by index, so that all stays in registers.
+                for axis in 0..3 {
+                    let along = &mut self.axes[axis];
+                    if axis == through {
+                        along.enter(along.place + along.sign * (ahead + 1));
+                    } else if ahead > 0 {
+                        along.leap(leave, axis > through);
+                    }
+                }
             }
             if end > start {
                 self.start = end;
@@ -178,25 +232,6 @@ impl<const ALIKE: bool> Iterator for CellWalk<'_, ALIKE> {
             }
         }
         None
-    }
-}
-
-impl<const ALIKE: bool> CellWalk<'_, ALIKE> {
-    /// Into the next cell through the border of `axis` at distance `leave`.
-    #[inline]
-    fn step(&mut self, through: usize, leave: f32, reach: i32) {
-        if reach > 0 {
-            // Across all alike cells at once: the other axes have moved on as well.
-            let there = self.entry + self.direction * leave;
-            for axis in (0..3).filter(|&axis| axis != through) {
-                let (first, last) = (self.place[axis] - reach, self.place[axis] + reach);
-                self.place[axis] =
-                    cast::floor_i32(there[axis]).clamp(first.max(0), last.min(self.grid.dims[axis] - 1));
-                self.next[axis] = self.exit(axis, self.place[axis]);
-            }
-        }
-        self.place[through] += self.sign[through] * (reach + 1);
-        self.next[through] = self.exit(through, self.place[through]);
     }
 }
 
@@ -211,4 +246,63 @@ fn nearest(borders: [f32; 3]) -> (usize, f32) {
         2
     };
     (axis, borders[axis])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Ray, Vec3};
+    use tyndall_testing::SplitMix;
+
+    /// Random cells, few or most of them empty.
+    fn grid(random: &mut SplitMix) -> MajorantGrid {
+        let dims = [(); 3].map(|()| 1 + (random.bits() % 24) as usize);
+        let rarity = 1 + random.bits() % 60;
+        let opacity = |random: &mut SplitMix| f32::from(u8::from(random.bits().is_multiple_of(rarity)));
+        let opacities: Vec<_> = (0..dims.iter().product()).map(|_| [0.0, opacity(random)]).collect();
+        let empty = emptiness::extents(dims, &opacities).into_iter().chain([0; 3]).collect();
+        MajorantGrid { dims: dims.map(|n| cast::fit_u32(n).cast_signed()), edge: 8.0, opacities, empty }
+    }
+
+    /// From anywhere to anywhere, or through edges and corners of cells as nearly as rounding lets it.
+    fn track(random: &mut SplitMix, grid: &MajorantGrid) -> Track {
+        let size = Vec3::new(grid.dims[0] as f32, grid.dims[1] as f32, grid.dims[2] as f32) * grid.edge;
+        let corner = |p: Vec3| (p / grid.edge).round() * grid.edge;
+        let [mut from, mut to] = [(); 2].map(|()| Vec3::from_array(random.uniforms()) * size);
+        let kind = random.bits() % 3;
+        if kind > 0 {
+            to = corner(to);
+        }
+        if kind > 1 {
+            from = corner(from);
+        }
+        let way = to - from;
+        let length = grid.dims.iter().sum::<i32>() as f32 * grid.edge;
+        Track { ray: Ray::new(from, way / way.length().max(1e-3)), length, before: 0.0 }
+    }
+
+    #[test]
+    fn leaps_change_no_bit_of_the_stretches_with_matter() {
+        let mut random = SplitMix::new(1987);
+        let (mut leaps, mut with_matter) = (0, 0);
+        for _ in 0..2000 {
+            let grid = grid(&mut random);
+            for _ in 0..50 {
+                let track = track(&mut random, &grid);
+                let matter = |cell: &CellStretch| cell.most > 0.0;
+                let singly: Vec<_> = grid.walk_singly(&track).collect();
+                let leaping: Vec<_> = grid.walk(&track).collect();
+                leaps += singly.len() - leaping.len();
+                let stretches = |all: &[CellStretch]| all.iter().copied().filter(matter).collect::<Vec<_>>();
+                assert_eq!(stretches(&leaping), stretches(&singly), "{track:?}");
+                with_matter += stretches(&singly).len();
+                for stretches in [&singly, &leaping] {
+                    assert!(stretches.windows(2).all(|pair| pair[0].end == pair[1].start));
+                    let ends = stretches.first().zip(stretches.last());
+                    assert!(ends.is_none_or(|(a, b)| a.start == 0.0 && b.end == track.length));
+                }
+            }
+        }
+        assert!(leaps > 100_000 && with_matter > 50_000, "{leaps}, {with_matter}");
+    }
 }

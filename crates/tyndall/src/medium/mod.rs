@@ -3,10 +3,10 @@
 //! Extinction is scalar, `sigma_t(v) = density * opacity(v)` per world unit; colour enters as albedo.
 
 mod clip;
+mod emptiness;
 mod free_flight;
 mod majorants;
 mod march;
-mod reach;
 mod skip;
 
 pub use clip::{Clip, ClipShape};
