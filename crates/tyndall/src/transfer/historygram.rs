@@ -128,6 +128,13 @@ impl HistoryGroups {
         &self.groups
     }
 
+    /// What reading a value of a bin leaves in a history.
+    #[inline]
+    #[must_use]
+    pub fn of(&self, bin: usize) -> Historygram {
+        Historygram(1 << self.groups[bin])
+    }
+
     /// What reading values from `first` to `last` leaves in a history, both in bins.
     #[must_use]
     pub fn between(&self, first: usize, last: usize) -> Historygram {
@@ -139,7 +146,7 @@ impl HistoryGroups {
     /// The Historygram of changed bins, which histories are asked for \[Jonsson12, sec. 4.2\].
     #[must_use]
     pub fn query(&self, changed: &BinSet) -> Historygram {
-        changed.iter().fold(Historygram::EMPTY, |query, bin| query | self.between(bin, bin))
+        changed.iter().fold(Historygram::EMPTY, |query, bin| query | self.of(bin))
     }
 }
 
@@ -148,8 +155,12 @@ fn group(x: f32) -> u8 {
 }
 
 /// Cuts bins, given their counts without the two outer ones, into groups that hold equally many. What fills a group alone
-/// takes its share from it, and the rest is cut anew.
+/// takes its share from it, and the rest is cut anew. Few values have a group each.
 fn equal_counts(inside: &[u64], count: u8) -> Vec<u8> {
+    let values = inside.iter().filter(|&&n| n > 0).count();
+    if 2 * values < usize::from(count) {
+        return each_value(inside);
+    }
     let mut left: u64 = inside.iter().sum();
     let (mut group, mut held) = (0_u8, 0_u64);
     let mut groups = Vec::with_capacity(inside.len() + 2);
@@ -168,6 +179,20 @@ fn equal_counts(inside: &[u64], count: u8) -> Vec<u8> {
         groups.push(group);
     }
     groups.push(group);
+    groups
+}
+
+/// A group for each bin that is not empty, and for what lies between two of them: materials are often told apart half-way
+/// between their values, so that an edit of one reaches to there.
+fn each_value(inside: &[u64]) -> Vec<u8> {
+    let (mut group, mut held) = (0, 0);
+    let mut groups = vec![0];
+    for &n in inside {
+        group += u8::from(n > 0 || held > 0);
+        held = n;
+        groups.push(group);
+    }
+    groups.push(group + u8::from(held > 0));
     groups
 }
 
@@ -203,14 +228,20 @@ mod tests {
         counts[3] = 1_000_000;
         let groups = equal_counts(&counts, 32);
         assert!(groups[1025] >= 30, "{}", groups[1025]);
-        // Fewer values than groups: each has its own.
+    }
+
+    #[test]
+    fn few_values_and_what_lies_between_them_have_a_group_each() {
         let mut few = vec![0; 1024];
-        for bin in [5, 300, 301, 900] {
+        for bin in [5, 300, 301, 1023] {
             few[bin] = 77;
         }
-        let groups = equal_counts(&few, 64);
-        let of: Vec<_> = [5, 300, 301, 900].map(|bin| groups[bin + 1]).to_vec();
-        assert_eq!(of, [0, 1, 2, 3]);
+        let groups = equal_counts(&few, 9);
+        let of = [0, 5, 6, 7, 300, 301, 302, 303, 1023, 1024, 1025].map(|bin| groups[bin]);
+        assert_eq!(of, [0, 0, 1, 2, 2, 3, 4, 5, 5, 6, 7]);
+        assert!(groups.is_sorted());
+        // One group less than these need: cut as if they were many.
+        assert_eq!(equal_counts(&few, 8)[1025], 3);
     }
 
     #[test]
@@ -226,7 +257,7 @@ mod tests {
             (300..=500).for_each(|bin| changed.insert(bin));
             assert_eq!(groups.query(&changed), groups.between(300, 500));
             for bin in 0..ValueBins::COUNT {
-                let one = groups.between(bin, bin);
+                let one = groups.of(bin);
                 assert_eq!(one.bits().count_ones(), 1);
                 assert!(!changed.contains(bin) || one.meets(groups.query(&changed)));
             }
