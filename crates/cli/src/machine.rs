@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use tyndall::film::Film;
 use tyndall::integrator::PhotonMapping;
 use tyndall::message::place;
+use tyndall::scene::document::Document;
 use tyndall::scene::{IntegratorKind, RenderSettings};
 use tyndall::simd::Level;
 
@@ -83,6 +84,13 @@ pub fn check_film(size: [u32; 2], input: &Path) -> Result<(), Failure> {
         ))),
         _ => Ok(()),
     }
+}
+
+/// Bytes in which a session may keep samples: those asked for, as far as that leaves room for much else.
+pub fn sample_memory(document: &Document) -> usize {
+    let asked = u64::from(document.render.path.history_memory) << 20;
+    let free = tyndall_formats::memory::available().map_or(asked, |available| available / 8);
+    usize::try_from(asked.min(free)).unwrap_or(usize::MAX)
 }
 
 /// Refuses photons for which there is no memory.

@@ -3,7 +3,7 @@
 use crate::args::ReplayOptions;
 use crate::edits::{self, Edit};
 use crate::input::{Input, of_assets};
-use crate::machine::{Interrupt, check_film, check_photons, pool, vector_instructions};
+use crate::machine::{Interrupt, check_film, check_photons, pool, sample_memory, vector_instructions};
 use crate::{Failure, output, say};
 use serde_json::{Map, Value, json};
 use std::io::Write;
@@ -122,7 +122,7 @@ struct Before {
 struct Check {
     scratch_s: f64,
     max_abs_diff: f64,
-    /// Pixels, or light paths and segments, that were kept and are wrong.
+    /// Pixels, light paths and segments, or samples, that were kept and are wrong.
     false_negatives: usize,
     /// Those that were computed again for nothing; `None` where before and after cannot be compared.
     false_positives: Option<usize>,
@@ -144,7 +144,8 @@ impl<'a> Live<'a> {
         }
         check_film(document.film.size, path)?;
         let scene = build(&pool, &document, &assets, path)?;
-        let session = Session::with_level(scene, pool.clone(), level);
+        let mut session = Session::with_level(scene, pool.clone(), level);
+        session.keep_samples(sample_memory(&document));
         Ok(Self { input, path, value, document, assets, session, pool, level, interrupt, told: source.notes })
     }
 
@@ -176,6 +177,9 @@ impl<'a> Live<'a> {
         let (document, assets) = self.parse(&value)?;
         check_film(document.film.size, self.path)?;
         let scene = build(&self.pool, &document, &assets, self.path)?;
+        if document.render.path != self.document.render.path {
+            self.session.keep_samples(sample_memory(&document));
+        }
         self.session.set_scene(scene);
         self.refine(1);
         let latency_s = begun.elapsed().as_secs_f64();
@@ -204,10 +208,9 @@ impl<'a> Live<'a> {
         let (document, assets) = self.parse(&self.value)?;
         let scene = build(&self.pool, &document, &assets, self.path)?;
         let mut fresh = Session::with_level(scene, self.pool.clone(), self.level);
+        fresh.keep_samples(sample_memory(&document));
         refine(&mut fresh, 1, self.interrupt);
         let scratch_s = begun.elapsed().as_secs_f64();
-
-        let of_items = self.session.snapshot().zip(self.session.computed()).zip(fresh.snapshot());
 
         // Pictures are equal at equal numbers of samples, of which a kept one may have more than were asked for.
         let samples = document.render.samples.max(self.session.film().samples());
@@ -216,6 +219,7 @@ impl<'a> Live<'a> {
         if self.interrupt.asked() {
             return Err(Failure::Interrupted);
         }
+        let of_items = self.session.snapshot().zip(self.session.computed()).zip(fresh.snapshot());
         let (live, fresh) = (self.session.image(), fresh.image());
         let differing = live.rgba.iter().zip(&fresh.rgba).filter(|(a, b)| a != b).count();
         let (false_negatives, false_positives) = if let Some(((kept, computed), of_fresh)) = of_items {

@@ -46,7 +46,9 @@ pub struct Session {
     tiles: Vec<TileState>,
     threads: Arc<rayon::ThreadPool>,
     level: Level,
-    /// Samples per pixel, on average, that the last edit left valid.
+    /// Bytes in which samples are kept for edits to come.
+    sample_memory: usize,
+    /// Samples per pixel, on average, that the last edit left in the film.
     kept: f64,
     /// Time spent since the last edit on what a sample needs beforehand, and on samples.
     spent: [Duration; 2],
@@ -62,38 +64,64 @@ impl Session {
     /// [`Self::new`] with certain vector instructions instead of the widest.
     #[must_use]
     pub fn with_level(scene: Scene, threads: Arc<rayon::ThreadPool>, level: Level) -> Self {
-        let integrator = threads.install(|| Integrator::new(&scene, level));
+        let integrator = threads.install(|| Integrator::new(&scene, level, 0));
         let mut film = Film::new(scene.size);
         let tiles = vec![TileState::default(); film.tiles_mut().len()];
-        Self { integrator, film, tiles, scene, threads, level, kept: 0.0, spent: [Duration::ZERO; 2] }
+        let (kept, spent) = (0.0, [Duration::ZERO; 2]);
+        Self { integrator, film, tiles, scene, threads, level, sample_memory: 0, kept, spent }
+    }
+
+    /// From now on `path` keeps in so many bytes the first samples of each pixel, 32 bytes for each, so that an edit takes again
+    /// those alone that it touched; 0, as at first, keeps none. It changes no picture. What was rendered so far is begun anew if
+    /// the number of bytes changes. Other methods do not ask: photon mapping keeps what it needs, marching nothing.
+    pub fn keep_samples(&mut self, bytes: usize) {
+        if self.sample_memory != bytes {
+            self.sample_memory = bytes;
+            if matches!(self.integrator, Integrator::Path(_)) {
+                self.begin_anew();
+            }
+        }
+    }
+
+    fn begin_anew(&mut self) {
+        self.film = Film::new(self.scene.size);
+        self.tiles = vec![TileState::default(); self.film.tiles_mut().len()];
+        let Self { scene, threads, level, sample_memory, .. } = self;
+        self.integrator = threads.install(|| Integrator::new(scene, *level, *sample_memory));
     }
 
     /// Goes on with an edited scene; gives what the edit changed. This is the only place where light is discarded, and the
     /// difference alone decides what: after it the session will come to the picture that a new one would.
     pub fn set_scene(&mut self, scene: Scene) -> Difference {
         let difference = Difference::between(&self.scene, &scene);
+        let old = std::mem::replace(&mut self.scene, scene);
         if self.integrator.is_touched_by(&difference) {
-            self.film = Film::new(scene.size);
+            self.film = Film::new(self.scene.size);
             self.tiles.resize_with(self.film.tiles_mut().len(), TileState::default);
-            let Self { integrator, tiles, scene: old, threads, level, .. } = self;
-            threads.install(|| integrator.update(old, &scene, &difference, tiles, *level));
+            let Self { integrator, tiles, scene, threads, .. } = self;
+            if !threads.install(|| integrator.update(&old, scene, &difference, tiles)) {
+                self.begin_anew();
+            }
         } else {
             self.integrator.count_anew(&mut self.tiles);
         }
-        self.scene = scene;
         self.kept = self.film.mean_samples();
         self.spent = [Duration::ZERO; 2];
         difference
     }
 
     /// Of what the session is made of, the share that was really computed since the last edit, or since the beginning:
-    /// of the `pixels` those that took samples; of light paths (`photons`) and view-ray `segments` those computed.
+    /// of the `pixels` the share of their samples so far; of light paths (`photons`) and view-ray `segments` those computed.
     #[must_use]
     pub fn recomputed(&self) -> Vec<(&'static str, f64)> {
         let share = |[all, computed]: [usize; 2]| computed as f64 / all.max(1) as f64;
         match &self.integrator {
             Integrator::RayMarch(_) | Integrator::Path(_) => {
-                vec![("pixels", (self.film.mean_samples() - self.kept).min(1.0))]
+                let [width, height] = self.scene.size.map(f64::from);
+                let found: usize = self.tiles.iter().map(|tile| tile.samples()[2]).sum();
+                let samples = self.film.mean_samples();
+                let taken = samples - self.kept - found as f64 / (width * height);
+                vec![("pixels", if samples > 0.0 { taken.max(0.0) / samples } else { 0.0 })]
             }
             Integrator::Photon(photon) => {
                 let segments = self.tiles.iter().map(TileState::segments);
@@ -103,11 +131,19 @@ impl Session {
         }
     }
 
-    /// How many light paths and segments were computed since the last edit; `None` for a method that keeps pixels alone.
+    /// Of what is kept through edits beside pixels, how many light paths and segments, or samples, were computed since the last
+    /// edit; `None` where nothing is kept.
     #[must_use]
     pub fn computed(&self) -> Option<usize> {
-        let Integrator::Photon(photon) = &self.integrator else { return None };
-        Some(photon.paths()[1] + self.tiles.iter().map(|tile| tile.segments()[1]).sum::<usize>())
+        match &self.integrator {
+            Integrator::Photon(photon) => {
+                Some(photon.paths()[1] + self.tiles.iter().map(|tile| tile.segments()[1]).sum::<usize>())
+            }
+            Integrator::Path(path) if path.keeps() => {
+                Some(self.tiles.iter().map(|tile| tile.samples()[1]).sum())
+            }
+            Integrator::Path(_) | Integrator::RayMarch(_) => None,
+        }
     }
 
     /// Places on view rays where the first sample gathered photons since the last edit, or since the beginning: what segments
@@ -135,11 +171,15 @@ impl Session {
     }
 
     /// What is kept for edits to come: of each kind how many there are, and the bytes of all together. A photon mapper keeps
-    /// light `paths`, their `photons`, the `map` that sorts these, and `segments`; other methods keep nothing.
+    /// light `paths`, their `photons`, the `map` that sorts these, and `segments`; the path tracer `samples` if told so.
     #[must_use]
     pub fn kept(&self) -> Vec<(&'static str, [usize; 2])> {
         match &self.integrator {
-            Integrator::RayMarch(_) | Integrator::Path(_) => Vec::new(),
+            Integrator::RayMarch(_) => Vec::new(),
+            Integrator::Path(_) => {
+                let samples = self.tiles.iter().map(|tile| [tile.samples()[0], tile.bytes()]);
+                vec![("samples", samples.fold([0; 2], |[a, b], [c, d]| [a + c, b + d]))]
+            }
             Integrator::Photon(photon) => {
                 let ([of_paths, of_photons, map], photons) = (photon.bytes(), photon.photons());
                 let paths = [photon.paths()[0], of_paths];

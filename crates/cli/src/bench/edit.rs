@@ -164,12 +164,16 @@ fn computed(session: &Session) -> [f64; 2] {
 }
 
 /// The picture as bits: colour and alpha of all pixels, then their depth.
-fn bits(session: &Session) -> Vec<u32> {
+pub fn bits(session: &Session) -> Vec<u32> {
     let image = session.image();
     image.rgba.as_flattened().iter().chain(&image.depth).map(|x| x.to_bits()).collect()
 }
 
-fn check(live: &[u32], fresh: &[u32]) -> Result<(), Failure> {
+/// Refuses a picture that is not the one from nothing.
+///
+/// # Errors
+/// With the first numbers that differ.
+pub fn check(live: &[u32], fresh: &[u32]) -> Result<(), Failure> {
     let numbers = |(a, b): (&u32, &u32)| (a != b).then(|| (f32::from_bits(*a), f32::from_bits(*b)));
     let mut differing = live.iter().zip(fresh).filter_map(numbers);
     let Some((a, b)) = differing.next() else { return Ok(()) };

@@ -7,6 +7,7 @@ mod growth;
 mod historygram_figures;
 mod historygrams;
 mod photon_scenes;
+mod samples;
 mod scenes;
 mod timing;
 
@@ -100,6 +101,7 @@ const HISTORYGRAMS: &[Table] = &[
     historygram_figures::figure_9,
     historygram_figures::defaults,
     gathering::estimates,
+    samples::edits,
 ];
 
 /// Runs the tables and prints each as soon as it is there, or all as JSON.

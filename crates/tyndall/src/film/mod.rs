@@ -81,6 +81,18 @@ impl Tile {
         self.samples
     }
 
+    /// Pixels in it.
+    #[must_use]
+    pub fn pixel_count(&self) -> usize {
+        self.pixels.len()
+    }
+
+    /// Samples that its pixels have taken, all together.
+    #[must_use]
+    pub fn taken(&self) -> usize {
+        self.samples as usize * self.pixels.len() + self.ahead
+    }
+
     /// The pixels that are next to take a sample, all with the same number, which comes second; at most `most`.
     pub fn next(&self, most: usize) -> (impl ExactSizeIterator<Item = [u32; 2]>, u32) {
         let last = self.order.len().min(self.ahead + most);
@@ -173,8 +185,7 @@ impl Film {
     /// Samples per pixel, averaged over the picture.
     #[must_use]
     pub fn mean_samples(&self) -> f64 {
-        let taken = |t: &Tile| f64::from(t.samples) * t.pixels.len() as f64 + t.ahead as f64;
-        let taken: f64 = self.tiles.iter().map(taken).sum();
+        let taken: f64 = self.tiles.iter().map(|t| t.taken() as f64).sum();
         taken / (f64::from(self.size[0]) * f64::from(self.size[1]))
     }
 

@@ -1,5 +1,6 @@
 //! The methods of computing light.
 
+mod history;
 mod path;
 mod photon;
 mod raymarch;
@@ -13,9 +14,10 @@ pub use stop::Stop;
 use crate::film::Tile;
 use crate::scene::{Difference, IntegratorKind, Scene};
 use crate::simd::Level;
-use path::Walk;
+use path::{SampleTile, Walk};
 use photon::{Paths, SegmentTile};
 use raymarch::Packet;
+use rayon::prelude::*;
 
 /// A method. Everything about a sample follows from its pixel and number.
 #[derive(Debug)]
@@ -29,14 +31,15 @@ pub enum Integrator {
 }
 
 impl Integrator {
-    /// The scene's method, prepared for the scene and the processor's vector instructions.
+    /// The scene's method, prepared for the scene and the processor's vector instructions; `path` keeps samples for edits to
+    /// come in so many bytes.
     #[must_use]
-    pub fn new(scene: &Scene, level: Level) -> Self {
+    pub fn new(scene: &Scene, level: Level, sample_memory: usize) -> Self {
         match scene.render.integrator {
             IntegratorKind::RayMarch { step, light_samples } => {
                 Self::RayMarch(RayMarch::new(scene, step, light_samples, level))
             }
-            IntegratorKind::Path => Self::Path(Path::new(level)),
+            IntegratorKind::Path => Self::Path(Path::keeping(scene, level, sample_memory)),
             IntegratorKind::Photon(settings) => {
                 Self::Photon(Box::new(PhotonMapping::new(scene, settings, level)))
             }
@@ -54,28 +57,31 @@ impl Integrator {
         }
     }
 
-    /// Goes on from one scene to another that touches it, and keeps what of its own and of the tiles' state is still valid.
+    /// Goes on from one scene to another that touches it, and keeps what of its own and of the tiles' state is still valid;
+    /// false where that is nothing, and all is to begin anew.
     pub fn update(
         &mut self,
         old: &Scene,
         new: &Scene,
         difference: &Difference,
         tiles: &mut [TileState],
-        level: Level,
-    ) {
+    ) -> bool {
         let kept = match self {
             Self::Photon(photon) => {
                 let mut segments: Vec<_> = tiles.iter_mut().map(|tile| &mut tile.segments).collect();
                 photon.update(old, new, difference, &mut segments)
             }
-            Self::RayMarch(_) | Self::Path(_) => false,
+            Self::Path(path) => {
+                let query = path.update(old, new, difference);
+                if let Some(query) = &query {
+                    tiles.par_iter_mut().for_each(|tile| tile.samples.ask(query));
+                }
+                query.is_some()
+            }
+            Self::RayMarch(_) => false,
         };
-        if kept {
-            tiles.iter_mut().for_each(|tile| (tile.walk, tile.packet) = (None, None));
-        } else {
-            tiles.fill(TileState::default());
-            *self = Self::new(new, level);
-        }
+        tiles.iter_mut().for_each(|tile| (tile.walk, tile.packet) = (None, None));
+        kept
     }
 
     /// Begins to count what is computed.
@@ -83,10 +89,12 @@ impl Integrator {
         if let Self::Photon(photon) = self {
             photon.count_anew();
         }
-        tiles
-            .iter_mut()
-            .filter_map(|tile| tile.segments.as_mut())
-            .for_each(|segments| segments.computed = [0; 2]);
+        for tile in tiles {
+            tile.samples.counts = [0; 2];
+            if let Some(segments) = &mut tile.segments {
+                segments.computed = [0; 2];
+            }
+        }
     }
 
     /// Makes ready what the next sample of all pixels needs; false where a stop came before.
@@ -112,7 +120,9 @@ impl Integrator {
     pub fn refine(&self, scene: &Scene, tile: &mut Tile, state: &mut TileState, samples: u32, stop: &Stop) {
         match self {
             Self::RayMarch(raymarch) => raymarch.refine(scene, tile, &mut state.packet, samples, stop),
-            Self::Path(path) => path.refine(scene, tile, &mut state.walk, samples, stop),
+            Self::Path(path) => {
+                path.refine(scene, tile, (&mut state.walk, &mut state.samples), samples, stop);
+            }
             Self::Photon(photon) => {
                 if tile.samples() < samples {
                     photon.refine(scene, tile, &mut state.segments, stop);
@@ -122,43 +132,49 @@ impl Integrator {
     }
 }
 
-/// What a photon mapper kept at one time: for checks.
+/// What a session kept at one time beside pixels: for checks.
 #[derive(Clone, Debug)]
 pub struct Kept {
     paths: Paths,
-    segments: Vec<Option<SegmentTile>>,
+    tiles: Vec<(Option<SegmentTile>, SampleTile)>,
 }
 
 impl Kept {
-    /// Of an integrator and its tiles; `None` for a method that keeps nothing but pixels.
+    /// Of an integrator and its tiles; `None` where nothing but pixels is kept.
     #[must_use]
     pub fn of(integrator: &Integrator, tiles: &[TileState]) -> Option<Self> {
-        let Integrator::Photon(photon) = integrator else { return None };
-        let segments = tiles.iter().map(|tile| tile.segments.clone()).collect();
-        Some(Self { paths: photon.light_paths(), segments })
+        let paths = match integrator {
+            Integrator::Photon(photon) => photon.light_paths(),
+            Integrator::Path(path) if path.keeps() => Paths::default(),
+            Integrator::Path(_) | Integrator::RayMarch(_) => return None,
+        };
+        let tiles = tiles.iter().map(|tile| (tile.segments.clone(), tile.samples.clone())).collect();
+        Some(Self { paths, tiles })
     }
 
-    /// Light paths and segments that are there at both times, and are other ones.
+    /// Light paths and segments, or samples, that are there at both times, and are other ones.
     #[must_use]
     pub fn differing(&self, other: &Self) -> usize {
-        self.paths.differing(&other.paths) + self.segments_differing(other)[0]
+        self.paths.differing(&other.paths) + self.tiles_differing(other)[0]
     }
 
-    /// Light paths and segments that are other ones than before, or were not there.
+    /// Light paths and segments, or samples, that are other ones than before, or were not there.
     #[must_use]
     pub fn changed_since(&self, before: &Self) -> usize {
-        self.paths.differing(&before.paths) + self.segments_differing(before).iter().sum::<usize>()
+        self.paths.differing(&before.paths) + self.tiles_differing(before).iter().sum::<usize>()
     }
 
-    fn segments_differing(&self, other: &Self) -> [usize; 2] {
+    fn tiles_differing(&self, other: &Self) -> [usize; 2] {
         let mut counts = [0; 2];
-        for (i, tile) in self.segments.iter().enumerate() {
-            let Some(tile) = tile else { continue };
-            let [both, here] = match other.segments.get(i) {
-                Some(Some(other)) if other.len() == tile.len() => tile.differing(other),
-                _ => [0, tile.len()],
-            };
-            counts = [counts[0] + both, counts[1] + here];
+        let mut add = |[both, here]: [usize; 2]| counts = [counts[0] + both, counts[1] + here];
+        for (i, (segments, samples)) in self.tiles.iter().enumerate() {
+            let other = other.tiles.get(i);
+            add(other.map_or([0, samples.len()], |(_, other)| samples.differing(other)));
+            let Some(segments) = segments else { continue };
+            add(match other {
+                Some((Some(other), _)) if other.len() == segments.len() => segments.differing(other),
+                _ => [0, segments.len()],
+            });
         }
         counts
     }
@@ -172,6 +188,8 @@ pub struct TileState {
     packet: Option<Box<Packet>>,
     /// Of the view rays, for edits to come.
     segments: Option<SegmentTile>,
+    /// Samples, for edits to come.
+    samples: SampleTile,
 }
 
 impl TileState {
@@ -187,9 +205,16 @@ impl TileState {
         self.segments.as_ref().map_or(0, |segments| segments.computed[1])
     }
 
-    /// Bytes that its view rays keep.
+    /// Samples that are kept; of those since the last edit the ones that were taken, and that were found here.
+    #[must_use]
+    pub fn samples(&self) -> [usize; 3] {
+        let [taken, found] = self.samples.counts;
+        [self.samples.len(), taken, found]
+    }
+
+    /// Bytes that its view rays keep, or its samples.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        self.segments.as_ref().map_or(0, SegmentTile::bytes)
+        self.samples.bytes() + self.segments.as_ref().map_or(0, SegmentTile::bytes)
     }
 }

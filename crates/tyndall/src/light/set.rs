@@ -1,6 +1,6 @@
 //! All lights of a scene together, chosen among by power.
 
-use super::{Emission, Light, LightSample, Target};
+use super::{Emission, Environment, Light, LightSample, Target};
 use crate::math::{Ray, Rgb, Vec3};
 use crate::medium::Medium;
 use crate::sampling::{BounceSample, Discrete, Stream};
@@ -44,11 +44,20 @@ impl LightSet {
     /// What the camera sees behind everything: the visible environments.
     #[must_use]
     pub fn sky(&self, direction: Vec3) -> Rgb {
-        let visible = |light: &Light| match light {
-            Light::Environment(e) if e.visible => Some(e.radiance(direction)),
+        self.visible().map(|environment| environment.radiance(direction)).sum()
+    }
+
+    /// Whether it sees one.
+    #[must_use]
+    pub fn has_sky(&self) -> bool {
+        self.visible().next().is_some()
+    }
+
+    fn visible(&self) -> impl Iterator<Item = &Environment> {
+        self.lights.iter().filter_map(|light| match light {
+            Light::Environment(environment) if environment.visible => Some(environment),
             _ => None,
-        };
-        self.lights.iter().filter_map(visible).sum()
+        })
     }
 
     /// Draws a light by power and a direction to it; the sample's density counts the choice.

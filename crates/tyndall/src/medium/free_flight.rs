@@ -27,10 +27,16 @@ pub struct Collision {
     pub value: f32,
 }
 
-/// What hears of all that a flight reads.
+/// What hears of all that a flight or a transmittance reads.
 pub(crate) trait FlightNotes {
+    /// Whether anybody listens; then empty cells are crossed one by one, so that each is told.
+    const LISTENS: bool = true;
+
     /// The majorant of a cell.
-    fn cell(&mut self, cell: usize);
+    fn most(&mut self, cell: usize);
+
+    /// The smallest and the largest opacity of a cell.
+    fn limits(&mut self, cell: usize);
 
     /// The opacity of a data value.
     fn value(&mut self, value: f32);
@@ -38,8 +44,13 @@ pub(crate) trait FlightNotes {
 
 /// Nobody listens.
 impl FlightNotes for () {
+    const LISTENS: bool = false;
+
     #[inline(always)]
-    fn cell(&mut self, _: usize) {}
+    fn most(&mut self, _: usize) {}
+
+    #[inline(always)]
+    fn limits(&mut self, _: usize) {}
 
     #[inline(always)]
     fn value(&mut self, _: f32) {}
@@ -54,20 +65,24 @@ impl Medium {
     #[inline]
     #[must_use]
     pub fn free_flight(&self, track: &Track, first: f32, stream: &mut Stream) -> Option<Collision> {
-        self.fly(track, self.majorants.walk(track), first, stream, &mut ())
+        self.free_flight_noting(track, first, stream, &mut ())
     }
 
     /// [`Self::free_flight`] that tells all that it reads, and that nothing else can change: the numbers that it draws depend
     /// on the majorant of each cell that it crosses, and on no other's.
-    #[inline]
-    pub(crate) fn free_flight_noting(
+    #[inline(always)]
+    pub(crate) fn free_flight_noting<N: FlightNotes>(
         &self,
         track: &Track,
         first: f32,
         stream: &mut Stream,
-        notes: &mut impl FlightNotes,
+        notes: &mut N,
     ) -> Option<Collision> {
-        self.fly(track, self.majorants.walk_singly(track), first, stream, notes)
+        if N::LISTENS {
+            self.fly(track, self.majorants.walk_singly(track), first, stream, notes)
+        } else {
+            self.fly(track, self.majorants.walk(track), first, stream, notes)
+        }
     }
 
     #[inline(always)]
@@ -81,7 +96,7 @@ impl Medium {
     ) -> Option<Collision> {
         let mut depth = first;
         for cell in cells {
-            notes.cell(cell.cell);
+            notes.most(cell.cell);
             let majorant = cell.most * self.density;
             let mut t = cell.start;
             // False at once in an empty cell, where the step is infinite or 0/0.
@@ -103,14 +118,37 @@ impl Medium {
 
     /// An unbiased estimate of the transmittance along a track: residual ratio tracking \[Novak14\], in
     /// which each cell's smallest extinction is the control and is integrated exactly. Where the tentative collisions lie
-    /// does not depend on what is found there, so that many are looked up at once.
+    /// does not depend on what is found there, so that many are looked up at once. Tells all that it reads.
     #[inline(always)]
-    pub(crate) fn transmittance_lanes<S: Lanes>(&self, simd: S, track: &Track, stream: &mut Stream) -> f32 {
+    pub(crate) fn transmittance_lanes<S: Lanes, N: FlightNotes>(
+        &self,
+        simd: S,
+        track: &Track,
+        stream: &mut Stream,
+        notes: &mut N,
+    ) -> f32 {
+        if N::LISTENS {
+            self.track_ratio(simd, track, self.majorants.walk_singly(track), stream, notes)
+        } else {
+            self.track_ratio(simd, track, self.majorants.walk(track), stream, notes)
+        }
+    }
+
+    #[inline(always)]
+    fn track_ratio<S: Lanes>(
+        &self,
+        simd: S,
+        track: &Track,
+        cells: impl Iterator<Item = CellStretch>,
+        stream: &mut Stream,
+        notes: &mut impl FlightNotes,
+    ) -> f32 {
         let mut transmittance = 1.0_f32;
         let mut control = 0.0_f32;
         let mut depth = stream.exponential();
         let mut collisions = Tentative::new();
-        for cell in self.majorants.walk(track) {
+        for cell in cells {
+            notes.limits(cell.cell);
             // Again and again, so that it does not matter how many empty cells follow.
             while control > ROULETTE_DEPTH {
                 if stream.uniform() >= (-ROULETTE_DEPTH).exp() {
@@ -126,7 +164,7 @@ impl Medium {
             while t + depth / majorant < cell.end {
                 t = (t + depth / majorant).max(t.next_up());
                 if collisions.push::<S>(t, cell.least, spread) {
-                    transmittance *= collisions.take(simd, self, track);
+                    transmittance *= collisions.take(simd, self, track, notes);
                     if transmittance < ROULETTE_WEIGHT {
                         if stream.uniform() * ROULETTE_WEIGHT >= transmittance {
                             return 0.0;
@@ -138,7 +176,7 @@ impl Medium {
             }
             depth = (depth - (cell.end - t) * majorant).max(0.0);
         }
-        transmittance * collisions.take(simd, self, track) * (-control).exp()
+        transmittance * collisions.take(simd, self, track, notes) * (-control).exp()
     }
 
     /// An unbiased estimate of the transmittance along a track, by residual ratio tracking \[Novak14\].
@@ -150,7 +188,7 @@ impl Medium {
 
             #[inline(always)]
             fn run<S: Lanes>(self, simd: S) -> f32 {
-                self.0.transmittance_lanes(simd, self.1, self.2)
+                self.0.transmittance_lanes(simd, self.1, self.2, &mut ())
             }
         }
         level.run(Estimate(self, track, stream))
@@ -193,12 +231,23 @@ impl Tentative {
 
     /// The product of the chances that the pending collisions are no real ones.
     #[inline(always)]
-    fn take<S: Lanes>(&mut self, simd: S, medium: &Medium, track: &Track) -> f32 {
+    fn take<S: Lanes, N: FlightNotes>(
+        &mut self,
+        simd: S,
+        medium: &Medium,
+        track: &Track,
+        notes: &mut N,
+    ) -> f32 {
         if self.count == 0 {
             return 1.0;
         }
         let place = track.lanes(simd, S::f32s::from_slice(simd, &self.t[..S::WIDTH]));
         let value = medium.volume.value_lanes(simd, place);
+        if N::LISTENS {
+            for &value in &value.as_slice()[..self.count] {
+                notes.value(value);
+            }
+        }
         let least = S::f32s::from_slice(simd, &self.least[..S::WIDTH]);
         let spread = S::f32s::from_slice(simd, &self.spread[..S::WIDTH]);
         let residual = medium.transfer.opacity_lanes(simd, value) - least;

@@ -1,6 +1,7 @@
 //! Edits against a live session: after any sequence of them, the picture is the one from nothing, bit for bit.
 
 mod photons;
+mod samples;
 
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -105,7 +106,8 @@ fn patch(random: &mut SplitMix, document: &Value) -> Value {
         11 => json!({ "clip": [{ "type": "plane", "point": [u(), 0, 0], "normal": [1, u(), 0] }] }),
         12 => json!({ "clip": null }),
         13 => {
-            let i = cast::index(u() * 2.0);
+            let i =
+                if lights.as_array().is_some_and(|all| all.len() > 1) { cast::index(u() * 2.0) } else { 0 };
             let key = match lights[i]["type"].as_str() {
                 Some("directional") => "irradiance",
                 Some("point") => "intensity",

@@ -1,9 +1,9 @@
 //! Some hundred paths of one light that start near each other: traced together, so that they read the same matter, and
 //! traced again where an edit touched them.
 
-use super::histories::Histories;
-use super::paths::{Begun, Interactions, Past, Photon, Tracer, bounce_of};
+use super::paths::{Begun, Interactions, Photon, Tracer, bounce_of};
 use super::spatial::Changed;
+use crate::integrator::history::{Histories, Past};
 use crate::math::cast;
 use crate::sampling::LightPathSampler;
 use crate::scene;
@@ -119,7 +119,7 @@ impl Kernel for Update<'_> {
         let touched = |chunk: &Chunk, path: usize| !chunk.traced || chunk.past(path).meets(&chunk.changed);
         let mut retraced = 0;
         if (0..chunk.len()).any(|path| touched(chunk, path)) {
-            let mut found = Interactions::like(&chunk.interactions, tracer.groups.count());
+            let mut found = Interactions::like(&chunk.interactions, tracer.reading.groups.count());
             let mut ends = Vec::with_capacity(chunk.len());
             for path in 0..chunk.len() {
                 if touched(chunk, path) {

@@ -1,65 +1,11 @@
 //! What of light paths, photons and segments an edit leaves valid.
 
-use super::bounds::Bounds;
-use super::lights::{Ground, LightPaths, Plan, sources};
-use super::paths::Past;
+use super::lights::{LightPaths, Plan, sources};
 use super::{PhotonMapping, SegmentTile, step};
+use crate::integrator::history::Touched;
 use crate::light::Light;
 use crate::scene::{Difference, Scene};
-use crate::transfer::{BinSet, HistoryGroups, Historygram, TransferFunction};
-use crate::volume::ValueBins;
 use std::sync::atomic::Ordering;
-
-/// What histories are asked for after an edit \[Jonsson12, sec. 4.2\].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Query {
-    /// Values whose change ends what paths have in common with new ones.
-    paths: Past,
-    /// Values whose change shows in a segment.
-    view: Historygram,
-    /// Whether glowing matter starts its paths elsewhere.
-    glow: bool,
-}
-
-impl Query {
-    fn new(groups: &HistoryGroups, old: &Scene, new: &Scene, difference: &Difference) -> Self {
-        let transfers = [old.medium.transfer(), new.medium.transfer()];
-        let bins_where = |is: &dyn Fn(&TransferFunction, usize) -> bool| {
-            let mut set = BinSet::EMPTY;
-            let bins = (0..ValueBins::COUNT).filter(|&bin| transfers.iter().any(|t| is(t, bin)));
-            bins.for_each(|bin| set.insert(bin));
-            groups.query(&set)
-        };
-        let matter = bins_where(&|transfer, bin| transfer.opacity_range(around(transfer, bin))[1] > 0.0);
-        let transfer = &difference.transfer;
-        let opacity = groups.query(&transfer.opacity);
-        let flight = if difference.density.is_some() { matter | opacity } else { opacity };
-        let mut scatter = groups.query(&transfer.scattering);
-        if difference.phase || difference.surfaces {
-            scatter = Historygram::ALL;
-        }
-        // Where there is no matter nothing scatters.
-        let scatter = scatter & matter;
-        let glowing = bins_where(&|transfer, bin| transfer.emission_bound(around(transfer, bin)) > 0.0);
-        let emission = groups.query(&transfer.emission);
-        // Cells are weighed by all that is in them, also by what does not glow.
-        let places = [old, new].map(|scene| scene.lights.emission());
-        let moved = matches!(places, [Some(old), Some(new)] if !old.same_places(new));
-        Self {
-            paths: Past { flight, scatter },
-            view: flight | scatter | (emission & matter),
-            glow: moved || !emission.is_empty() || flight.meets(glowing),
-        }
-    }
-}
-
-/// Values that surely hold those of a bin.
-pub(super) fn around(transfer: &TransferFunction, bin: usize) -> [f32; 2] {
-    let bins = transfer.bins();
-    let lo = if bin == 0 { f32::MIN } else { bins.value(bin as f32 - 0.01) };
-    let hi = if bin + 1 == ValueBins::COUNT { f32::MAX } else { bins.value(bin as f32 + 1.01) };
-    [lo, hi]
-}
 
 impl PhotonMapping {
     /// Drops what an edit touched of paths, photons and segments, and nothing else; false where all is to begin anew.
@@ -78,11 +24,11 @@ impl PhotonMapping {
         {
             return false;
         }
-        let mut query = Query::new(&self.ground.groups, old, new, difference);
+        let mut touched = Touched::new(&self.ground.reading.groups, old, new, difference);
         if !difference.transfer.opacity.is_empty() {
-            let Ground { groups, cells, bounds, .. } = &mut self.ground;
-            query.paths.flight |= bounds.raised(old.medium.majorants(), new.medium.majorants());
-            *bounds = Bounds::new(groups, cells, &new.medium);
+            // Light paths do not read what is smallest.
+            let [_, raised] = self.ground.reading.update(&old.medium, &new.medium);
+            touched.paths.flight |= raised;
         }
         self.traced.store(0, Ordering::Relaxed);
         self.pass = None;
@@ -90,9 +36,9 @@ impl PhotonMapping {
             self.places.clear();
         }
         for light in &mut self.lights {
-            light.chunks.iter_mut().for_each(|chunk| chunk.add_change(&query.paths));
+            light.chunks.iter_mut().for_each(|chunk| chunk.add_change(&touched.paths));
         }
-        self.update_lights(new, query.glow);
+        self.update_lights(new, touched.glow);
         if difference.density.is_some() {
             self.map = None;
         }
@@ -102,7 +48,7 @@ impl PhotonMapping {
         }
         for tile in tiles {
             match tile {
-                Some(tile) if self.has_segments => tile.add_change(query.view),
+                Some(tile) if self.has_segments => tile.add_change(touched.view),
                 tile => **tile = None,
             }
         }

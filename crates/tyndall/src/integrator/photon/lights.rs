@@ -1,16 +1,15 @@
 //! The light paths of a scene: of each light equally many, so that no edit of one light changes the paths of others.
 
-use super::bounds::Bounds;
 use super::chunk::{self, Chunk, Update};
 use super::paths::{Source, Tracer};
 use super::spatial::Changed;
 use crate::integrator::Stop;
+use crate::integrator::history::Reading;
 use crate::light::{Enclosure, Light};
 use crate::math::{Rgb, cast};
 use crate::sampling::LightPathSampler;
 use crate::scene::{Histories, PhotonSettings, Scene};
 use crate::simd::Level;
-use crate::transfer::{HistoryGroups, Historygram};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -31,11 +30,7 @@ pub(super) struct LightPaths {
 /// What tracing needs beside the scene.
 #[derive(Debug)]
 pub(super) struct Ground {
-    pub groups: HistoryGroups,
-    /// Of each majorant cell the groups of values that it can yield.
-    pub cells: Vec<Historygram>,
-    /// And those that its majorant comes from.
-    pub bounds: Bounds,
+    pub reading: Reading,
     pub enclosure: Enclosure,
     pub level: Level,
 }
@@ -150,13 +145,8 @@ pub(super) fn trace<'s>(
     let unfinished = AtomicUsize::new(work.len());
     work.into_par_iter().with_max_len(1).for_each(|(chunk, source, stream)| {
         if !stop().reached() {
-            let tracer = Tracer {
-                scene,
-                source,
-                enclosure: &ground.enclosure,
-                groups: &ground.groups,
-                bounds: &ground.bounds,
-            };
+            let Ground { reading, enclosure, .. } = ground;
+            let tracer = Tracer { scene, source, enclosure, reading };
             let numbers = |path| LightPathSampler::new(seed, pass, stream, path);
             let paths = ground.level.run(Update { chunk, tracer, numbers: &numbers, places });
             traced.fetch_add(paths, Ordering::Relaxed);

@@ -9,12 +9,10 @@
 //! from nothing, bit for bit. The first sample of every pixel is this *base map*; later ones are refinement passes with
 //! photons of their own and a shrinking radius \[Knaus11\], and start anew after an edit.
 
-mod bounds;
 mod chunk;
 mod edit;
 mod gather;
 mod grid;
-mod histories;
 mod kernel;
 mod lights;
 mod map;
@@ -28,13 +26,12 @@ mod view;
 pub(crate) use segments::SegmentTile;
 
 use super::Stop;
+use super::history::Reading;
 use crate::film::Tile;
 use crate::light::Enclosure;
 use crate::math::DVec3;
 use crate::scene::{Estimate, PhotonSettings, Scene, SpatialHistory};
 use crate::simd::Level;
-use crate::transfer::HistoryGroups;
-use bounds::Bounds;
 use grid::CellGrid;
 use kernel::Slice;
 use lights::{Ground, LightPaths, Plan, sources, trace};
@@ -69,12 +66,7 @@ impl PhotonMapping {
     pub fn new(scene: &Scene, settings: PhotonSettings, level: Level) -> Self {
         let medium = &*scene.medium;
         let volume = medium.volume();
-        let groups = HistoryGroups::new(volume, settings.history_bits, settings.bins);
-        let bins = medium.transfer().bins();
-        let cell_values = volume.cells_of(medium.majorants().voxels());
-        let of_cell = |&[lo, hi]: &[f32; 2]| groups.between(bins.bin(lo), bins.bin(hi));
-        let cells: Vec<_> = cell_values.ranges().iter().map(of_cell).collect();
-        let bounds = Bounds::new(&groups, &cells, medium);
+        let reading = Reading::new(medium, settings.history_bits, settings.bins);
         // The map's own cells: photons are added up in the order of whole cells, so that one beside a gather moves its last bit.
         let grid = cells_for(scene, &settings, settings.radius);
         // When so many photons have changed, few segments are left that gather none of them.
@@ -82,14 +74,16 @@ impl PhotonMapping {
         let places = match settings.spatial {
             SpatialHistory::Off => Changed::off(),
             SpatialHistory::Axes => Changed::axes(grid, enough),
-            SpatialHistory::Cells => Changed::cells(grid, cell_values, enough),
+            SpatialHistory::Cells => {
+                Changed::cells(grid, volume.cells_of(medium.majorants().voxels()), enough)
+            }
         };
         let sources = sources(scene);
         let plan = Plan::new(scene, &settings, 0, sources.len());
         let lights = sources.into_iter().map(|source| LightPaths::new(source, &plan)).collect();
         Self {
             settings,
-            ground: Ground { groups, cells, bounds, enclosure: Enclosure::new(volume.grid()), level },
+            ground: Ground { reading, enclosure: Enclosure::new(volume.grid()), level },
             lights,
             map: None,
             places,
@@ -160,7 +154,7 @@ impl PhotonMapping {
             self.ground.level.run(pass::Refine { view, tile, stop });
             return;
         }
-        let Ground { groups, cells, level, .. } = &self.ground;
+        let Ground { reading: Reading { groups, cells, .. }, level, .. } = &self.ground;
         let per_ray = self.settings.segments as usize;
         let segments = segments.get_or_insert_with(|| {
             let pixels = tile.next(usize::MAX).0.len();
@@ -224,7 +218,7 @@ fn cells_for(scene: &Scene, settings: &PhotonSettings, radius: f32) -> CellGrid 
 }
 
 /// The paths of all lights at one time.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Paths(Vec<LightPaths>);
 
 impl Paths {

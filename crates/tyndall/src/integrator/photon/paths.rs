@@ -1,13 +1,12 @@
 //! The photon pass: light paths, each of whose interactions knows what it depends on \[Jonsson12, sec. 3.2, 4.3.1\].
 
-use super::bounds::Bounds;
-use super::histories::Histories;
+use crate::integrator::history::{Histories, Past, Reading};
 use crate::light::{Emission, Enclosure, Light};
 use crate::math::{PackedDirection, Ray, Rgb, Vec3};
-use crate::medium::{FlightNotes, Medium};
+use crate::medium::Medium;
 use crate::sampling::LightPathSampler;
 use crate::scene::Scene;
-use crate::transfer::{HistoryGroups, Historygram};
+use crate::transfer::Historygram;
 use bytemuck::{Pod, Zeroable};
 
 /// Light that arrives where it interacts with matter.
@@ -54,33 +53,6 @@ pub(super) fn most_kept(max_scatter: u32) -> f64 {
     let whole = f64::from(WHOLE);
     let last = f64::from(max_scatter);
     if last <= whole { last } else { whole * (1.0 + (last / whole).ln()) }
-}
-
-/// What an interaction depends on: values met in flight, whose opacity mattered, and values where light scattered, whose
-/// albedo and surfaces mattered. Both with all that came before on the path.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Past {
-    pub flight: Historygram,
-    pub scatter: Historygram,
-}
-
-impl Past {
-    pub const NOTHING: Self = Self { flight: Historygram::EMPTY, scatter: Historygram::EMPTY };
-
-    /// Whether something of it has changed.
-    #[inline]
-    pub fn meets(&self, query: &Self) -> bool {
-        self.flight.meets(query.flight) || self.scatter.meets(query.scatter)
-    }
-
-    pub fn is_empty(&self) -> bool {
-        *self == Self::NOTHING
-    }
-
-    pub fn add(&mut self, other: &Self) {
-        self.flight |= other.flight;
-        self.scatter |= other.scatter;
-    }
 }
 
 /// What light paths start from.
@@ -147,8 +119,7 @@ pub(super) struct Tracer<'a> {
     pub scene: &'a Scene,
     pub source: Source<'a>,
     pub enclosure: &'a Enclosure,
-    pub groups: &'a HistoryGroups,
-    pub bounds: &'a Bounds,
+    pub reading: &'a Reading,
 }
 
 /// Where a path goes on.
@@ -167,24 +138,6 @@ struct Flight {
     bounce: u32,
 }
 
-/// Writes down what a flight reads.
-struct Notes<'a> {
-    tracer: &'a Tracer<'a>,
-    read: Historygram,
-}
-
-impl FlightNotes for Notes<'_> {
-    #[inline(always)]
-    fn cell(&mut self, cell: usize) {
-        self.read |= self.tracer.bounds.of(cell);
-    }
-
-    #[inline(always)]
-    fn value(&mut self, value: f32) {
-        self.read |= self.tracer.read(value);
-    }
-}
-
 impl Tracer<'_> {
     fn medium(&self) -> &Medium {
         &self.scene.medium
@@ -193,14 +146,7 @@ impl Tracer<'_> {
     /// What reading the optics of a place leaves in a history.
     #[inline(always)]
     pub fn read_at(&self, place: Vec3) -> Historygram {
-        self.read(self.medium().volume().value(place))
-    }
-
-    /// What reading the optics of a value leaves in a history.
-    #[inline(always)]
-    fn read(&self, value: f32) -> Historygram {
-        let bin = self.medium().transfer().bins().bin(value);
-        self.groups.between(bin, bin)
+        self.reading.of(self.medium().transfer().bins(), self.medium().volume().value(place))
     }
 
     /// Traces a path, from its beginning or on from one of its interactions, and gives what the whole of it depends on: also
@@ -239,11 +185,11 @@ impl Tracer<'_> {
     #[inline(always)]
     fn fly(&self, flight: &Flight, numbers: &LightPathSampler, past: &mut Past) -> Option<Photon> {
         let track = self.medium().track(&flight.ray, f32::INFINITY);
-        let mut notes = Notes { tracer: self, read: past.flight };
+        let mut writer = self.reading.writer(self.medium(), *past);
         let first = numbers.bounce(flight.bounce).flight_depth();
         let mut stream = numbers.stream(flight.bounce);
-        let collision = self.medium().free_flight_noting(&track, first, &mut stream, &mut notes);
-        past.flight = notes.read;
+        let collision = self.medium().free_flight_noting(&track, first, &mut stream, &mut writer);
+        *past = writer.past;
         let collision = collision?;
         Some(Photon {
             place: collision.place.to_array(),
@@ -264,7 +210,7 @@ impl Tracer<'_> {
     ) -> Option<Flight> {
         let place = photon.index_place();
         let value = self.medium().volume().value(place);
-        past.scatter |= self.read(value);
+        past.scatter |= self.reading.of(self.medium().transfer().bins(), value);
         let event = self.medium().event(place, &self.medium().transfer().optics(value));
         let u = numbers.bounce(bounce);
         let scattered = event.sample_adjoint(-photon.direction.unpack(), u.scatter)?;

@@ -1,10 +1,10 @@
 //! View rays in segments, each by itself computed, kept and found invalid \[Jonsson12, sec. 4.3.2\].
 
-use super::histories::Histories;
 use super::spatial::Changed;
 use super::view::{Notes, OPAQUE, Stretch, Stretches, View};
 use crate::film::{PixelSample, Tile};
 use crate::integrator::Stop;
+use crate::integrator::history::Histories;
 use crate::math::{Ray, Rgb, cast};
 use crate::medium::{MOST_LANES, Track};
 use crate::scene::Scene;

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::shape::{
-    GatherSpacing, HistoryBits, LightSamples, MajorantCell, Nearest, Photons, Radius, Samples,
+    GatherSpacing, HistoryBits, HistoryMemory, LightSamples, MajorantCell, Nearest, Photons, Radius, Samples,
     ScatteringOrder, Segments, StepLength, StepsPerVoxel,
 };
 
@@ -91,11 +91,16 @@ pub struct PathSettings {
     /// volume. It changes the speed, never the expected picture.
     #[schemars(with = "MajorantCell")]
     pub majorant_cell: u32,
+
+    /// MiB in which a session that edits the scene keeps the first samples of each pixel, 32 bytes for each, so that an edit
+    /// takes again those alone that it touched; 0 keeps none. It changes the speed, never the picture.
+    #[schemars(with = "HistoryMemory")]
+    pub history_memory: u32,
 }
 
 impl Default for PathSettings {
     fn default() -> Self {
-        Self { majorant_cell: 8 }
+        Self { majorant_cell: 8, history_memory: 512 }
     }
 }
 

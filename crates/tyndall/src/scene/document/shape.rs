@@ -72,6 +72,8 @@ shapes! {
     HistoryBits = { "type": "integer", "format": "uint32", "minimum": 32, "maximum": 128 };
     /// An edge in voxels, or 0.
     MajorantCell = { "type": "integer", "format": "uint32", "minimum": 0, "maximum": 4096 };
+    /// MiB.
+    HistoryMemory = { "type": "integer", "format": "uint32", "minimum": 0, "maximum": 1048576 };
     /// A position or a direction in world space.
     Vector = {
         "type": "array",

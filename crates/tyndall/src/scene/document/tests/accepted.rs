@@ -176,7 +176,7 @@ fn what_is_left_out_has_its_default() {
             "/render",
             json!({
                 "integrator": "path", "max_scatter": 64, "samples": 64, "seed": 0,
-                "raymarch": { "step": 0.5, "light_samples": 16 }, "path": { "majorant_cell": 8 },
+                "raymarch": { "step": 0.5, "light_samples": 16 }, "path": { "majorant_cell": 8, "history_memory": 512 },
                 "photon": {
                     "photons": 1_048_576, "radius": 1.5, "segments": 7, "steps_per_voxel": 2.0, "gather_spacing": 1.5,
                     "estimate": "point", "nearest": 32, "histories": "interactions", "history_bits": 64, "bins": "quantile", "spatial": "cells"
@@ -237,6 +237,7 @@ fn the_ends_of_the_ranges_are_accepted() {
         ("render.raymarch.step", json!(0.01)),
         ("render.raymarch.light_samples", json!(4096)),
         ("render.path.majorant_cell", json!(0)),
+        ("render.path.history_memory", json!(0)),
         ("film.size", json!([1, 1])),
         ("film.size", json!([16384, 16384])),
         ("camera.fov", json!(179.9)),

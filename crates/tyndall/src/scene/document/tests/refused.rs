@@ -141,6 +141,7 @@ fn numbers_outside_their_range_are_refused() {
     refused_values("render.raymarch.step", [json!(0), json!(0.005), json!(11)]);
     refused_values("render.raymarch.light_samples", [json!(0), json!(4097)]);
     refused_values("render.path.majorant_cell", [json!(-1), json!(4097)]);
+    refused_values("render.path.history_memory", [json!(-1), json!(1_048_577)]);
     for (phase, key) in [("henyey-greenstein", "g"), ("schlick", "k")] {
         for g in [-1.0, 1.0, 0.999_999_999, 2.0] {
             refused(

@@ -4,20 +4,28 @@
 //! A path flies to a collision, asks one light for what it sends there, scatters, and flies on. Light
 //! found by the two ways is weighed by the balance heuristic \[Veach97\]. Paths have any length and no stack.
 
+mod kept;
+
+pub(super) use kept::SampleTile;
+
 use super::Stop;
+use super::history::{Past, Writer};
 use crate::film::{PixelSample, Tile};
 use crate::light::LightSample;
 use crate::math::{Ray, Rgb, Vec3};
+use crate::medium::FlightNotes;
 use crate::sampling::{BounceSample, PathSampler};
 use crate::scattering::Event;
-use crate::scene::Scene;
+use crate::scene::{Difference, Scene};
 use crate::simd::{Kernel, Lanes, Level};
+use kept::{Keeper, Query};
 use std::ops::ControlFlow;
 
-/// The path tracer; it keeps nothing between samples.
-#[derive(Clone, Copy, Debug)]
+/// The path tracer. If it may keep samples, an edit takes again those alone that it touched.
+#[derive(Debug)]
 pub struct Path {
     level: Level,
+    keeper: Option<Keeper>,
 }
 
 /// A path whose throughput falls below this lives on by chance: at 1 every path does, with the share of light that it
@@ -25,10 +33,26 @@ pub struct Path {
 const ROULETTE_WEIGHT: f32 = 1.0;
 
 impl Path {
-    /// With these vector instructions.
+    /// With these vector instructions; keeps nothing.
     #[must_use]
     pub fn new(level: Level) -> Self {
-        Self { level }
+        Self { level, keeper: None }
+    }
+
+    /// That keeps samples of a scene for edits to come, as many of each pixel as so many bytes hold.
+    pub(super) fn keeping(scene: &Scene, level: Level, bytes: usize) -> Self {
+        Self { level, keeper: Keeper::new(scene, bytes) }
+    }
+
+    /// Whether it keeps samples.
+    #[must_use]
+    pub fn keeps(&self) -> bool {
+        self.keeper.is_some()
+    }
+
+    /// What an edit asks the samples for that are kept; `None` where nothing of them is left.
+    pub(super) fn update(&mut self, old: &Scene, new: &Scene, difference: &Difference) -> Option<Query> {
+        self.keeper.as_mut()?.update(old, new, difference)
     }
 
     /// Adds one path to every pixel of a tile until each has `samples`; see [`super::Integrator::refine`].
@@ -36,11 +60,11 @@ impl Path {
         &self,
         scene: &Scene,
         tile: &mut Tile,
-        pending: &mut Option<Walk>,
+        (pending, kept): (&mut Option<Walk>, &mut SampleTile),
         samples: u32,
         stop: &Stop,
     ) {
-        self.level.run(Refine { scene, tile, pending, samples, stop });
+        self.level.run(Refine { scene, tile, pending, kept, keeper: self.keeper.as_ref(), samples, stop });
     }
 
     /// An unbiased estimate of the radiance that arrives along a world ray.
@@ -54,6 +78,8 @@ struct Refine<'a> {
     scene: &'a Scene,
     tile: &'a mut Tile,
     pending: &'a mut Option<Walk>,
+    kept: &'a mut SampleTile,
+    keeper: Option<&'a Keeper>,
     samples: u32,
     stop: &'a Stop<'a>,
 }
@@ -63,18 +89,54 @@ impl Kernel for Refine<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { scene, tile, pending, samples, stop } = self;
+        let Self { scene, tile, pending, kept, keeper, samples, stop } = self;
         while tile.samples() < samples {
+            let number = tile.taken();
+            if let Some(sample) = kept.get(number) {
+                tile.add(&sample);
+                continue;
+            }
             let (mut pixels, sample) = tile.next(1);
             let Some(pixel) = pixels.next() else { return };
+            drop(pixels);
             let mut walk = pending.take().unwrap_or_else(|| Walk::of_pixel(scene, pixel, sample));
-            if !walk.go_on(simd, scene, stop) {
+            let keeper = keeper.filter(|keeper| keeper.wants(kept, tile));
+            let ended = if let Some(keeper) = keeper {
+                let mut writer = keeper.reading.writer(&scene.medium, walk.past);
+                let ended = walk.go_on(simd, scene, stop, &mut writer);
+                walk.past = writer.past;
+                ended
+            } else {
+                walk.go_on(simd, scene, stop, &mut ())
+            };
+            if !ended {
                 *pending = Some(walk);
                 return;
             }
-            drop(pixels);
+            if keeper.is_some() {
+                kept.put(number, &walk.seen, &walk.past, tile.pixel_count());
+            }
             tile.add(&walk.seen);
         }
+    }
+}
+
+/// What hears of all that a path reads.
+trait PathNotes: FlightNotes {
+    /// The optics of a value where light scatters.
+    fn scatters(&mut self, value: f32);
+}
+
+/// Nobody listens.
+impl PathNotes for () {
+    #[inline(always)]
+    fn scatters(&mut self, _: f32) {}
+}
+
+impl PathNotes for Writer<'_> {
+    #[inline(always)]
+    fn scatters(&mut self, value: f32) {
+        self.past.scatter |= self.read(value);
     }
 }
 
@@ -88,7 +150,7 @@ impl Kernel for Trace<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(mut self, simd: S) -> PixelSample {
-        while !self.walk.go_on(simd, self.scene, &Stop::never()) {}
+        while !self.walk.go_on(simd, self.scene, &Stop::never(), &mut ()) {}
         self.walk.seen
     }
 }
@@ -104,12 +166,14 @@ pub(super) struct Walk {
     /// Scatterings so far.
     order: u32,
     seen: PixelSample,
+    /// What it depends on, if that is noted.
+    past: Past,
 }
 
 impl Walk {
     fn new(ray: Ray, numbers: PathSampler) -> Self {
         let seen = PixelSample::default();
-        Self { numbers, ray, throughput: Rgb::WHITE, pdf: None, order: 0, seen }
+        Self { numbers, ray, throughput: Rgb::WHITE, pdf: None, order: 0, seen, past: Past::NOTHING }
     }
 
     fn of_pixel(scene: &Scene, [x, y]: [u32; 2], sample: u32) -> Self {
@@ -121,8 +185,8 @@ impl Walk {
 
     /// Goes on to the path's end, or for one scattering at least when told to stop; gives whether it has ended.
     #[inline(always)]
-    fn go_on<S: Lanes>(&mut self, simd: S, scene: &Scene, stop: &Stop) -> bool {
-        while self.scatter(simd, scene).is_continue() {
+    fn go_on<S: Lanes>(&mut self, simd: S, scene: &Scene, stop: &Stop, notes: &mut impl PathNotes) -> bool {
+        while self.scatter(simd, scene, notes).is_continue() {
             if stop.reached() {
                 return false;
             }
@@ -132,12 +196,12 @@ impl Walk {
 
     /// Flies to the next collision, gathers light there and scatters; breaks where the path ends.
     #[inline(always)]
-    fn scatter<S: Lanes>(&mut self, simd: S, scene: &Scene) -> ControlFlow<()> {
+    fn scatter<S: Lanes>(&mut self, simd: S, scene: &Scene, notes: &mut impl PathNotes) -> ControlFlow<()> {
         let medium = &*scene.medium;
-        let Self { numbers, ray, throughput, pdf, order, seen } = self;
+        let Self { numbers, ray, throughput, pdf, order, seen, .. } = self;
         let u = numbers.bounce(*order);
         let track = medium.track(ray, f32::INFINITY);
-        let collision = medium.free_flight(&track, u.flight_depth(), &mut numbers.stream);
+        let collision = medium.free_flight_noting(&track, u.flight_depth(), &mut numbers.stream, notes);
         let reach = collision.map_or(f32::INFINITY, |c| track.distance(c.t));
         if let Some(pdf) = *pdf {
             seen.radiance += *throughput * scene.lights.passed(ray, reach, pdf);
@@ -149,6 +213,10 @@ impl Walk {
             return ControlFlow::Break(());
         };
         let optics = medium.transfer().optics(collision.value);
+        // Where the path ends only the glow is read, by which lights are drawn: other than at once, such a path asked a light.
+        if *order < scene.render.max_scatter || *order == 0 {
+            notes.scatters(collision.value);
+        }
         if *order == 0 {
             seen.alpha = 1.0;
             seen.depth = reach * ray.direction.dot(scene.camera.view());
@@ -165,7 +233,8 @@ impl Walk {
         }
         let event = medium.event(collision.place, &optics);
         let here = medium.volume().grid().index_to_world(collision.place);
-        seen.radiance += *throughput * direct(simd, scene, &event, here, -ray.direction, &u, numbers);
+        seen.radiance +=
+            *throughput * direct(simd, scene, &event, here, -ray.direction, &u, (numbers, notes));
         let Some(scattered) = event.sample(-ray.direction, u.scatter) else { return ControlFlow::Break(()) };
         *throughput *= scattered.weight;
         let brightest = throughput.max_component();
@@ -192,7 +261,7 @@ fn direct<S: Lanes>(
     here: Vec3,
     w_out: Vec3,
     u: &BounceSample,
-    numbers: &mut PathSampler,
+    (numbers, notes): (&mut PathSampler, &mut impl FlightNotes),
 ) -> Rgb {
     let medium = &*scene.medium;
     let Some(light) = scene.lights.sample(medium, here, u, &mut numbers.stream) else { return Rgb::BLACK };
@@ -201,7 +270,7 @@ fn direct<S: Lanes>(
         return Rgb::BLACK;
     }
     let track = medium.track(&Ray::new(here, light.direction), light.distance);
-    unshadowed * medium.transmittance_lanes(simd, &track, &mut numbers.stream)
+    unshadowed * medium.transmittance_lanes(simd, &track, &mut numbers.stream, notes)
 }
 
 /// Weight of drawing the light against drawing the scattered direction.

@@ -5,7 +5,7 @@ use crate::transfer::Historygram;
 
 /// Historygrams side by side, in 4, 8 or 16 bytes each.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Histories {
+pub(crate) struct Histories {
     /// Words of 32 bits each, the lowest first.
     words: Vec<u32>,
     width: usize,
@@ -27,6 +27,11 @@ impl Histories {
     pub fn push(&mut self, history: Historygram) {
         let bits = history.bits();
         self.words.extend((0..self.width).map(|word| part(bits, word)));
+    }
+
+    /// Makes room for so many more.
+    pub fn reserve(&mut self, more: usize) {
+        self.words.reserve_exact(self.width * more);
     }
 
     #[inline]

@@ -1,0 +1,60 @@
+//! What an edit asks histories for.
+
+use super::Past;
+use crate::scene::{Difference, Scene};
+use crate::transfer::{BinSet, HistoryGroups, Historygram, TransferFunction};
+use crate::volume::ValueBins;
+
+/// What histories are asked for after an edit \[Jonsson12, sec. 4.2\], where it left volume, clips and random numbers alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Touched {
+    /// Values whose change ends what paths have in common with new ones.
+    pub paths: Past,
+    /// Values whose change shows in a view ray.
+    pub view: Historygram,
+    /// Values that are or were matter.
+    pub matter: Historygram,
+    /// Whether glowing matter starts its paths elsewhere.
+    pub glow: bool,
+}
+
+impl Touched {
+    pub fn new(groups: &HistoryGroups, old: &Scene, new: &Scene, difference: &Difference) -> Self {
+        let transfers = [old.medium.transfer(), new.medium.transfer()];
+        let bins_where = |is: &dyn Fn(&TransferFunction, usize) -> bool| {
+            let mut set = BinSet::EMPTY;
+            let bins = (0..ValueBins::COUNT).filter(|&bin| transfers.iter().any(|t| is(t, bin)));
+            bins.for_each(|bin| set.insert(bin));
+            groups.query(&set)
+        };
+        let matter = bins_where(&|transfer, bin| transfer.opacity_range(around(transfer, bin))[1] > 0.0);
+        let transfer = &difference.transfer;
+        let opacity = groups.query(&transfer.opacity);
+        let flight = if difference.density.is_some() { matter | opacity } else { opacity };
+        let mut scatter = groups.query(&transfer.scattering);
+        if difference.phase || difference.surfaces {
+            scatter = Historygram::ALL;
+        }
+        // Where there is no matter nothing scatters.
+        let scatter = scatter & matter;
+        let glowing = bins_where(&|transfer, bin| transfer.emission_bound(around(transfer, bin)) > 0.0);
+        let emission = groups.query(&transfer.emission);
+        // Cells are weighed by all that is in them, also by what does not glow.
+        let places = [old, new].map(|scene| scene.lights.emission());
+        let moved = matches!(places, [Some(old), Some(new)] if !old.same_places(new));
+        Self {
+            paths: Past { flight, scatter },
+            view: flight | scatter | (emission & matter),
+            matter,
+            glow: moved || !emission.is_empty() || flight.meets(glowing),
+        }
+    }
+}
+
+/// Values that surely hold those of a bin.
+pub(super) fn around(transfer: &TransferFunction, bin: usize) -> [f32; 2] {
+    let bins = transfer.bins();
+    let lo = if bin == 0 { f32::MIN } else { bins.value(bin as f32 - 0.01) };
+    let hi = if bin + 1 == ValueBins::COUNT { f32::MAX } else { bins.value(bin as f32 + 1.01) };
+    [lo, hi]
+}
