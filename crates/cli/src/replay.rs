@@ -222,13 +222,14 @@ impl<'a> Live<'a> {
         let of_items = self.session.snapshot().zip(self.session.computed()).zip(fresh.snapshot());
         let (live, fresh) = (self.session.image(), fresh.image());
         let differing = live.rgba.iter().zip(&fresh.rgba).filter(|(a, b)| a != b).count();
+        let same_size = before.image.size == live.size;
         let (false_negatives, false_positives) = if let Some(((kept, computed), of_fresh)) = of_items {
             let positives = |before| computed.saturating_sub(kept.changed_since(before));
-            (kept.differing(&of_fresh), before.kept.as_ref().map(positives))
+            (kept.differing(&of_fresh), before.kept.as_ref().filter(|_| same_size).map(positives))
         } else {
             let redone = recomputed.iter().any(|(_, share)| *share > 0.0);
             let same_as_before = || before.image.rgba.iter().zip(&live.rgba).filter(|(a, b)| a == b).count();
-            let comparable = before.image.size == live.size && before.samples == samples;
+            let comparable = same_size && before.samples == samples;
             let positives = if redone { comparable.then(same_as_before) } else { Some(0) };
             (if redone { 0 } else { differing }, positives)
         };

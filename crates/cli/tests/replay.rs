@@ -55,8 +55,10 @@ fn every_edit_is_reported_and_equals_a_render_from_nothing() {
         assert_eq!(names[..4], ["thicker", "brighter", "edit 3", "wider"]);
         let redone: Vec<_> =
             reports.iter().map(|r| r["recomputed"]["pixels"].as_f64().expect("a share")).collect();
-        let method = if integrator == "path" { 1.0 } else { 0.0 };
-        assert_eq!(redone, [1.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, method, 0.0], "{told}");
+        // Samples that miss the cloud stay when its matter changes: half of them.
+        let (matter, method) = if integrator == "path" { (redone[0], 1.0) } else { (1.0, 0.0) };
+        assert!((0.4..0.6).contains(&matter) || integrator == "raymarch", "{told}");
+        assert_eq!(redone, [matter, 0.0, matter, 1.0, 1.0, 1.0, 1.0, 0.0, method, 0.0], "{told}");
         for report in reports {
             assert_eq!(
                 (&report["max_abs_diff"], &report["false_negatives"]),
@@ -67,7 +69,7 @@ fn every_edit_is_reported_and_equals_a_render_from_nothing() {
                 ["latency_s", "scratch_s", "speedup"].map(|key| report[key].as_f64().expect("a number"));
             assert!(latency > 0.0 && scratch > 0.0 && (speedup - scratch / latency).abs() < 1e-6 * speedup);
         }
-        // The sky behind the cloud is redone for nothing when the cloud gets thicker, but not where sizes differ.
+        // What the thicker cloud did not change was redone for nothing; where sizes differ there is nothing to compare.
         assert!(reports[0]["false_positives"].as_u64() > Some(0), "{told}");
         assert_eq!(reports[3]["false_positives"], Value::Null);
         let table = String::from_utf8(ended.stdout).expect("text");
