@@ -79,6 +79,22 @@ fn every_edit_is_reported_and_equals_a_render_from_nothing() {
 }
 
 #[test]
+fn light_paths_that_nobody_traced_are_not_wrong() {
+    let folder = with(&json!([
+        { "patch": { "transfer_function": { "points": [{ "value": 0.3, "opacity": 0.5 }] } } },
+        { "patch": { "render": { "max_scatter": 1 } } },
+        { "patch": { "render": { "max_scatter": 0 } } },
+    ]));
+    let options = ["--verify", "--integrator", "photon", "--set", "render.max_scatter=0"];
+    let (told, _) = replay(&folder, &options);
+    for (report, traced) in told["edits"].as_array().expect("a list").iter().zip([0.0, 1.0, 0.0]) {
+        let counts = ["max_abs_diff", "false_negatives"].map(|key| report[key].as_f64());
+        assert_eq!(counts, [Some(0.0); 2], "{report}");
+        assert_eq!(report["recomputed"]["photons"], traced, "{report}");
+    }
+}
+
+#[test]
 fn without_verify_nothing_is_rendered_twice() {
     let (told, ended) = replay(&with(&edits()), &["-q"]);
     assert_eq!((ended.status, ended.stderr.as_str(), ended.stdout.as_slice()), (Some(0), "", &b""[..]));

@@ -79,12 +79,14 @@ impl Chunk {
         Past { flight: self.flight.get(path), scatter: self.scatter.get(path) }
     }
 
-    /// Paths that are other ones in another chunk of the same paths.
+    /// Paths that are other ones in another chunk of the same paths, or were not traced there.
     pub fn differing(&self, other: &Self) -> usize {
         let photons =
             |chunk: &Self, path| bytemuck::cast_slice::<_, u8>(&chunk.photons()[chunk.range(path)]).to_vec();
-        let known = self.traced && other.traced && self.paths == other.paths;
-        if !known {
+        if !self.traced {
+            return 0;
+        }
+        if !other.traced || self.paths != other.paths {
             return self.len();
         }
         (0..self.len()).filter(|&path| photons(self, path) != photons(other, path)).count()
