@@ -119,6 +119,48 @@ fn majorants_that_few_values_raise_and_lower() {
     }
 }
 
+/// What an edit changed is not forgotten over the next one, when no picture was made between them.
+#[test]
+fn edits_that_follow_each_other_without_a_picture() {
+    let mut value = base("photon");
+    let point = |value: f64, albedo: f64| json!({ "value": value, "opacity": 0.3, "albedo": albedo });
+    let points = |[low, high]: [f64; 2]| json!([point(0.0, low), point(0.4, low), point(0.4, high)]);
+    value["volume"] =
+        json!({ "procedural": { "kind": "shells", "size": [20, 20, 20] }, "interpolation": "nearest" });
+    // No photon comes or goes, so that segments hear of edits by the values alone.
+    value["render"]["max_scatter"] = 1.into();
+    value["render"]["photon"] = json!({ "photons": 3000, "segments": 20, "radius": 0.5 });
+    value["transfer_function"]["points"] = points([0.9, 0.9]);
+    let mut live = Session::new(scene(&value), THREADS.clone());
+    refined(&mut live, 1);
+    for [first, second] in [[[0.5, 0.9], [0.5, 0.4]], [[0.5, 0.8], [0.6, 0.8]]] {
+        value["transfer_function"]["points"] = points(first);
+        live.set_scene(scene(&value));
+        value["transfer_function"]["points"] = points(second);
+        live.set_scene(scene(&value));
+        let found = refined(&mut live, 1);
+        assert!(found == refined(&mut Session::new(scene(&value), THREADS.clone()), 1), "{second:?}");
+    }
+}
+
+/// Where a light goes, the others have more paths, each of which stands for less.
+#[test]
+fn paths_that_stay_among_more_weigh_less() {
+    let mut value = base("photon");
+    value["film"]["size"] = json!([48, 40]);
+    value["render"]["max_scatter"] = 1.into();
+    // Paths of three lights and the glow stay in blocks of 65,536 each. Few cells of a small radius hold photons of two lights.
+    value["render"]["photon"] = json!({ "photons": 280_000, "segments": 20, "radius": 0.1 });
+    let mut live = Session::new(scene(&value), THREADS.clone());
+    refined(&mut live, 1);
+    value["lights"].as_array_mut().unwrap().pop();
+    live.set_scene(scene(&value));
+    let found = refined(&mut live, 1);
+    let paths = live.recomputed()[0].1;
+    assert!(paths > 0.0 && paths < 0.9, "{paths} of the paths");
+    assert!(found == refined(&mut Session::new(scene(&value), THREADS.clone()), 1));
+}
+
 /// Lights keep their numbers by their names, and photons are added up by these, not by the document's order.
 #[test]
 fn the_order_of_named_lights_moves_no_photon() {
