@@ -53,7 +53,8 @@ impl Integrator {
         let touched = difference.view() || difference.light() || difference.majorants;
         match self {
             Self::RayMarch(_) => touched,
-            Self::Path(_) | Self::Photon(_) => touched || difference.seed,
+            Self::Path(_) => touched || difference.seed,
+            Self::Photon(_) => touched || difference.seed || difference.lights.names,
         }
     }
 

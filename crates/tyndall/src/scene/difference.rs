@@ -45,6 +45,8 @@ pub struct LightsDifference {
     pub origins: Vec<LightOrigin>,
     /// Numbers of the old lights that are gone.
     pub removed: Vec<usize>,
+    /// Whether names are others, or stand elsewhere: methods draw other random numbers where these follow names.
+    pub names: bool,
 }
 
 /// Where a light comes from.
@@ -87,7 +89,12 @@ impl Difference {
     /// Whether nothing that light reads has changed.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        !(self.view() || self.light() || self.majorants || self.seed || !self.transfer.ior.is_empty())
+        !(self.view()
+            || self.light()
+            || self.majorants
+            || self.seed
+            || self.lights.names
+            || !self.transfer.ior.is_empty())
     }
 
     /// Whether the rays that look, or what is done with them, are others.
@@ -130,11 +137,12 @@ impl LightsDifference {
                 if was[k] == is[i] { LightOrigin::Same(k) } else { LightOrigin::Changed(k) }
             })
             .collect();
-        Self { origins, removed: (0..was.len()).filter(|&k| gone[k]).collect() }
+        let removed = (0..was.len()).filter(|&k| gone[k]).collect();
+        Self { origins, removed, names: old_names != new_names }
     }
 
-    /// Whether all lights are as they were, and in the same order: methods that choose among them by number see no
-    /// difference.
+    /// Whether all lights are as they were, whatever their names, and in the same order: methods that choose among them by
+    /// number see no difference.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         let in_place = |(i, origin): (usize, &LightOrigin)| *origin == LightOrigin::Same(i);

@@ -119,9 +119,11 @@ fn patch(random: &mut SplitMix, document: &Value) -> Value {
         14 => {
             // Their numbers change, and with them which light is drawn when; or one moves, or the last goes for a while.
             let lights = lights.as_array_mut().expect("a list");
-            match cast::index(u() * 3.0) {
+            match cast::index(u() * 4.0) {
                 0 => lights.rotate_left(1),
-                1 => lights
+                // By which photons draw their numbers.
+                1 => lights[0]["name"] = ["sun", "bulb", "lamp"][cast::index(u() * 3.0)].into(),
+                2 => lights
                     .iter_mut()
                     .filter(|l| l["name"] == "bulb")
                     .for_each(|l| l["position"][1] = u().into()),
@@ -285,6 +287,7 @@ fn lights_are_matched_by_name_then_by_number() {
     let origins = |lights: Vec<Value>| {
         let difference = difference(&before, &json!({ "lights": lights })).lights;
         assert_eq!(difference.is_empty(), lights == *before["lights"].as_array().unwrap());
+        assert_eq!(difference.names, !difference.is_empty());
         (difference.origins, difference.removed)
     };
     use LightOrigin::{Changed, New, Same};

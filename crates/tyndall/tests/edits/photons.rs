@@ -175,3 +175,23 @@ fn the_order_of_named_lights_moves_no_photon() {
     assert!(live.recomputed().iter().all(|(_, share)| *share == 0.0), "{:?}", live.recomputed());
     assert!(refined(&mut Session::new(scene(&value), THREADS.clone()), 1) == before);
 }
+
+/// A light's numbers follow its name: another name, other paths, of that light alone.
+#[test]
+fn a_light_by_another_name_sends_other_photons() {
+    let mut value = base("photon");
+    value["render"]["photon"] = json!({ "photons": 3000 });
+    let mut live = Session::new(scene(&value), THREADS.clone());
+    let before = refined(&mut live, 1);
+    for name in [Some("lamp"), None, Some("spot")] {
+        let light = value["lights"][2].as_object_mut().unwrap();
+        light.remove("name");
+        light.extend(name.map(|name| ("name".into(), name.into())));
+        live.set_scene(scene(&value));
+        let found = refined(&mut live, 1);
+        assert!(found != before, "{name:?}");
+        assert!(found == refined(&mut Session::new(scene(&value), THREADS.clone()), 1), "{name:?}");
+        let paths = live.recomputed()[0].1;
+        assert!(paths > 0.0 && paths < 1.0, "{paths} of the paths");
+    }
+}
