@@ -1,9 +1,11 @@
 //! What an edit of the transfer function changed: the values that now mean other optics.
 //!
 //! Compared is what rendering reads, not the list of points: the pairs of points between which a value lies, both clamped
-//! ends included, from which the tables follow bin by bin. A point that moves nothing but the rounding of its
-//! neighbourhood counts as a change there, since pictures are compared bit for bit.
+//! ends included, and the rows of the tables, which may round otherwise where a value's own pair is as it was: beside a point
+//! that came into the bin, or where emission bends by more or less of the brightest. A point that moves nothing but the
+//! rounding of its neighbourhood counts as a change there, since pictures are compared bit for bit.
 
+use super::glow::GlowTable;
 use super::{Optics, Point, TransferFunction};
 use crate::volume::ValueBins;
 
@@ -73,13 +75,23 @@ impl TransferDifference {
             let all = BinSet::all();
             return Self { opacity: all.clone(), scattering: all.clone(), emission: all.clone(), ior: all };
         }
+        let mut opacity = interpolated(old, new, |o| [o.opacity]);
+        let mut emission = emission(old, new);
+        for bin in 0..ValueBins::COUNT {
+            if old.opacities.differs(&new.opacities, bin) {
+                opacity.insert(bin);
+            }
+            if GlowTable::differs(old.glow.as_ref(), new.glow.as_ref(), bin) {
+                emission.insert(bin);
+            }
+        }
         Self {
-            opacity: interpolated(old, new, |o| [o.opacity]),
+            opacity,
             scattering: interpolated(old, new, |o| {
                 let (a, s) = (o.albedo, o.specular);
                 [a.r, a.g, a.b, s.r, s.g, s.b, o.surface, o.roughness]
             }),
-            emission: emission(old, new),
+            emission,
             ior: interpolated(old, new, |o| [o.ior]),
         }
     }
@@ -236,8 +248,8 @@ mod tests {
         let mut random = SplitMix::new(41);
         let mut uniform = move || cast::single(random.uniform());
         let mut kept = 0;
-        for round in 0..300 {
-            let count = 2 + round % 7;
+        for round in 0..420 {
+            let count = 2 + round / 7 % 7;
             let mut points: Vec<Point> = (0..count)
                 .map(|_| Point {
                     value: (uniform() * 1100.0 - 40.0).round()
@@ -251,18 +263,39 @@ mod tests {
                 })
                 .collect();
             points.sort_by(|a, b| a.value.total_cmp(&b.value));
-            let mut edited = points.clone();
             let which = cast::index(uniform() * count as f32).min(count - 1);
-            match round % 4 {
+            // A level stretch, and a jump at the border of two bins.
+            if which + 1 < count && uniform() < 0.5 {
+                points[which + 1].optics = points[which].optics;
+            }
+            if uniform() < 0.5 {
+                points.insert(which + 1, Point { optics: points[0].optics, ..points[which] });
+            }
+            let (at, mut edited) = (points[which].value, points.clone());
+            match round % 7 {
                 0 => edited[which].optics.opacity = uniform(),
                 1 => edited[which].optics.albedo.r = uniform(),
                 2 => edited[which].value += if which + 1 == count { 50.0 } else { 0.0 },
+                // Brighter by far, so that all else may bend more.
+                3 => edited[count - 1].optics.emission = Rgb::splat(1e4 * uniform()),
+                // Just above a jump, or not.
+                4 => edited[(which + 1).min(count - 1)].optics.emission.r += 1e-5,
+                // Two close points, of which the second may say nothing.
+                5 => {
+                    let next = edited.get(which + 1).map_or(2000.0, |p| p.value);
+                    let value = (edited[which].value + 0.3 * uniform()).min(next);
+                    edited.insert(which + 1, Point { value, ..edited[which] });
+                }
                 _ => drop(edited.remove(which)),
             }
-            let (before, after) = (function(&points), function(&edited));
+            let [before, after] =
+                [points, edited].map(|points| TransferFunction::over(ValueBins::new([0.0, 1024.0]), points));
+            // A point may have come between the two of a jump.
+            let (Ok(before), Ok(after)) = (before, after) else { continue };
             let difference = TransferDifference::between(&before, &after);
-            for i in 0..11_000_u16 {
-                let value = f32::from(i) * 0.1 - 30.0;
+            let across = (0..11_000_u16).map(|i| f32::from(i) * 0.1 - 30.0);
+            let beside = (0..2000_u16).map(|i| at + f32::from(i) * 1e-3 - 1.0);
+            for value in across.chain(beside) {
                 let (a, b) = (before.optics(value), after.optics(value));
                 let bin = before.bins().bin(value);
                 let same = |set: &BinSet, a: f32, b: f32, of: &str| {
@@ -275,9 +308,11 @@ mod tests {
                 same(&difference.opacity, a.opacity, b.opacity, "exact opacity");
                 same(&difference.scattering, a.albedo.r, b.albedo.r, "albedo");
                 same(&difference.emission, a.emission.r, b.emission.r, "emission");
+                let [a, b] = [&before, &after].map(|function| function.emitted(value).r);
+                same(&difference.emission, a, b, "emission by the table");
                 kept += usize::from(!difference.opacity.contains(bin));
             }
         }
-        assert!(kept > 500_000, "only {kept} values were kept");
+        assert!(kept > 2_000_000, "only {kept} values were kept");
     }
 }

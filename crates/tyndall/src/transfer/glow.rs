@@ -44,6 +44,15 @@ impl GlowTable {
         Self { bins, rows }
     }
 
+    /// Whether look-ups in a bin read other bits than those of another table in the same bins. No table is one of black; so is a
+    /// function that is asked where a line is black, unless the function differs.
+    pub(super) fn differs(old: Option<&Self>, new: Option<&Self>, bin: usize) -> bool {
+        let row = |table: Option<&Self>| table.map_or([0.0; 6], |table| table.rows[bin]);
+        let (old, new) = (row(old), row(new));
+        let black_or_asked = |row: &[f32; 6]| row[0].is_nan() || row.iter().all(|&x| x == 0.0);
+        old.map(f32::to_bits) != new.map(f32::to_bits) && !(black_or_asked(&old) && black_or_asked(&new))
+    }
+
     /// What matter of a value emits; `None` where the function is to be asked.
     #[inline]
     pub(super) fn emitted(&self, value: f32) -> Option<Rgb> {

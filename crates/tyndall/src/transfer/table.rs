@@ -41,7 +41,11 @@ impl OpacityTable {
             let start = knots.partition_point(|k| k[0] <= lower);
             let end = knots.partition_point(|k| k[0] < lower + 1.0);
             let below = if start == 0 { [knots[0][1], 0.0] } else { line(start - 1, lower) };
-            let places = &knots[start..end];
+            let after = if start == end { below } else { line(end - 1, lower) };
+            // Points on a level say nothing, and are not to be told from none.
+            let level =
+                below[1] == 0.0 && after == below && knots[start..end].iter().all(|k| k[1] == below[0]);
+            let places = if level { &[] } else { &knots[start..end] };
             let split = places.first().map_or(2.0, |k| k[0] - lower);
             let above = if places.is_empty() { below } else { line(end - 1, lower + split) };
             let one_place = places.iter().all(|k| k[0] == places[0][0]);
@@ -65,6 +69,17 @@ impl OpacityTable {
     /// The bins that the table is kept in.
     pub(super) fn bins(&self) -> ValueBins {
         self.bins
+    }
+
+    /// Whether look-ups in a bin read other bits than those of another table in the same bins, or ask the function where that one
+    /// does not.
+    pub(super) fn differs(&self, other: &Self, bin: usize) -> bool {
+        let row = |table: &Self| {
+            let split = table.splits[bin];
+            let lines = [0, 1, 2, 3].map(|i| table.lines[4 * bin + i].to_bits());
+            (!split.is_nan()).then_some((split.to_bits(), lines))
+        };
+        row(self) != row(other)
     }
 
     /// Whether the table cannot tell the first value from the second, nor what lies between them.

@@ -195,3 +195,26 @@ fn a_light_by_another_name_sends_other_photons() {
         assert!(paths > 0.0 && paths < 1.0, "{paths} of the paths");
     }
 }
+
+/// How wide a beam's slices may be follows from the steps, and these from density.
+#[test]
+fn slices_that_an_edit_of_density_widens_ask_for_all_that_they_gather() {
+    let mut value = base("photon");
+    let opacity = |value: f64, opacity: f64| json!({ "value": value, "opacity": opacity });
+    let lamp = |name: &str, position: [f64; 3], intensity: f64| json!({ "type": "point", "name": name, "position": position, "intensity": [intensity, 1, 1] });
+    value["transfer_function"]["points"] = json!([opacity(0.0, 0.3), opacity(1.0, 1.0)]);
+    value["medium"]["density"] = 200.into();
+    value["render"]["max_scatter"] = 1.into();
+    value["render"]["photon"] = json!({
+        "photons": 2000, "radius": 0.5, "estimate": "beam", "steps_per_voxel": 0.1, "gather_spacing": 0.1,
+    });
+    value["lights"] = json!([lamp("a", [20.0, 5.0, 0.0], 100.0), lamp("b", [0.0, 0.0, 8.0], 1.0)]);
+    let mut live = Session::new(scene(&value), THREADS.clone());
+    refined(&mut live, 1);
+    value["medium"]["density"] = 0.01.into();
+    live.set_scene(scene(&value));
+    refined(&mut live, 1);
+    value["lights"][1] = lamp("b", [0.0, 0.0, 8.0], 2.0);
+    live.set_scene(scene(&value));
+    assert_some_segments_change(&mut live, &value, "a brighter lamp");
+}

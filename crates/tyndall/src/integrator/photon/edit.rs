@@ -1,7 +1,7 @@
 //! What of light paths, photons and segments an edit leaves valid.
 
 use super::lights::{LightPaths, Plan, sources};
-use super::{PhotonMapping, SegmentTile, step};
+use super::{PhotonMapping, SegmentTile, places_for, step};
 use crate::integrator::history::Touched;
 use crate::light::Light;
 use crate::scene::{Difference, Scene};
@@ -32,7 +32,11 @@ impl PhotonMapping {
         }
         self.traced.store(0, Ordering::Relaxed);
         self.pass = None;
-        if tiles.iter().all(|tile| tile.as_ref().is_none_or(SegmentTile::is_settled)) {
+        // With other steps, segments end elsewhere, and the widest slice of a beam is another.
+        let steps = step(old, &self.settings) != step(new, &self.settings);
+        if steps {
+            self.places = places_for(new, &self.settings);
+        } else if tiles.iter().all(|tile| tile.as_ref().is_none_or(SegmentTile::is_settled)) {
             self.places.clear();
         }
         for light in &mut self.lights {
@@ -42,8 +46,7 @@ impl PhotonMapping {
         if difference.density.is_some() {
             self.map = None;
         }
-        // With other steps, segments end elsewhere.
-        if difference.camera || difference.size || step(old, &self.settings) != step(new, &self.settings) {
+        if difference.camera || difference.size || steps {
             self.has_segments = false;
         }
         for tile in tiles {

@@ -65,28 +65,16 @@ impl PhotonMapping {
     #[must_use]
     pub fn new(scene: &Scene, settings: PhotonSettings, level: Level) -> Self {
         let medium = &*scene.medium;
-        let volume = medium.volume();
         let reading = Reading::new(medium, settings.history_bits, settings.bins);
-        // The map's own cells: photons are added up in the order of whole cells, so that one beside a gather moves its last bit.
-        let grid = cells_for(scene, &settings, settings.radius);
-        // When so many photons have changed, few segments are left that gather none of them.
-        let enough = settings.photons as usize / 2;
-        let places = match settings.spatial {
-            SpatialHistory::Off => Changed::off(),
-            SpatialHistory::Axes => Changed::axes(grid, enough),
-            SpatialHistory::Cells => {
-                Changed::cells(grid, volume.cells_of(medium.majorants().voxels()), enough)
-            }
-        };
         let sources = sources(scene);
         let plan = Plan::new(scene, &settings, 0, sources.len());
         let lights = sources.into_iter().map(|source| LightPaths::new(source, &plan)).collect();
         Self {
             settings,
-            ground: Ground { reading, enclosure: Enclosure::new(volume.grid()), level },
+            ground: Ground { reading, enclosure: Enclosure::new(medium.volume().grid()), level },
             lights,
             map: None,
-            places,
+            places: places_for(scene, &settings),
             has_segments: false,
             pass: None,
             traced: AtomicUsize::new(0),
@@ -215,6 +203,22 @@ fn cells_for(scene: &Scene, settings: &PhotonSettings, radius: f32) -> CellGrid 
         Estimate::Point | Estimate::Nearest(_) => 1.0,
     };
     CellGrid::new(grid, radius, reach)
+}
+
+/// Where photons will change, in the map's own cells: photons are added up in the order of whole cells, so that one beside a
+/// gather moves its last bit.
+fn places_for(scene: &Scene, settings: &PhotonSettings) -> Changed {
+    let medium = &*scene.medium;
+    let grid = cells_for(scene, settings, settings.radius);
+    // When so many photons have changed, few segments are left that gather none of them.
+    let enough = settings.photons as usize / 2;
+    match settings.spatial {
+        SpatialHistory::Off => Changed::off(),
+        SpatialHistory::Axes => Changed::axes(grid, enough),
+        SpatialHistory::Cells => {
+            Changed::cells(grid, medium.volume().cells_of(medium.majorants().voxels()), enough)
+        }
+    }
 }
 
 /// The paths of all lights at one time.
