@@ -93,8 +93,10 @@ fn place(number: usize, [nx, ny, _]: [usize; 3]) -> [usize; 3] {
     [number % nx, number / nx % ny, number / (nx * ny)]
 }
 
+/// Rounds as look-ups do, so that what a cell of one value holds is what is read there.
 fn to_values(values: ValueMap, stored: [f64; 2]) -> [f32; 2] {
-    let [a, b] = stored.map(|v| cast::single(values.apply(v)));
+    let [slope, intercept] = [values.slope, values.intercept].map(cast::single);
+    let [a, b] = stored.map(|v| slope * cast::single(v) + intercept);
     [a.min(b), a.max(b)]
 }
 

@@ -1,12 +1,13 @@
 //! Every set of vector instructions gives the same picture, and the march the one that its definition says.
 
+use crate::photon::PHOTONS;
 use crate::scenes::{Setup, blocks, volume};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tyndall::camera::{Camera, Lens};
 use tyndall::film::Image;
 use tyndall::integrator::RayMarch;
-use tyndall::light::{Directional, Environment, Light};
+use tyndall::light::{Directional, Environment, Light, PointLight};
 use tyndall::math::{Ray, Rgb, Vec3};
 use tyndall::medium::Medium;
 use tyndall::scene::{IntegratorKind, Scene};
@@ -140,8 +141,11 @@ fn a_stop_takes_no_time() {
     let white = vec![Point { value: 0.0, optics: Optics { albedo: Rgb::WHITE, ..Optics::default() } }];
     let mut setup = Setup::new(blocks([4; 3], [2.0; 3], |_| 1.0), white, 900.0);
     setup.max_scatter = 1_000_000;
+    let inside = PointLight { position: Vec3::new(0.1, 0.2, 0.3), intensity: Rgb::WHITE };
+    setup.lights = vec![Light::Point(inside)];
     let whole = setup.scene();
-    for integrator in [IntegratorKind::Path, IntegratorKind::RayMarch { step: 0.001, light_samples: 1000 }] {
+    let march = IntegratorKind::RayMarch { step: 0.001, light_samples: 1000 };
+    for integrator in [IntegratorKind::Path, march, IntegratorKind::Photon(PHOTONS)] {
         let mut scene = whole.clone();
         scene.size = [256, 256];
         scene.render.integrator = integrator;

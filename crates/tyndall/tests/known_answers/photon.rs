@@ -21,7 +21,8 @@ const SAMPLES: u32 = 32;
 /// Share by which blur may change the mean of a picture; blocks, which it mixes, twice as much in the mean square.
 const BIAS: f64 = 0.01;
 
-const PHOTONS: PhotonSettings = PhotonSettings {
+/// Settings of most tests.
+pub const PHOTONS: PhotonSettings = PhotonSettings {
     photons: 200_000,
     radius: 1.0,
     segments: 7,

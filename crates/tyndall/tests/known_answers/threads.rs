@@ -1,14 +1,15 @@
 //! The same bits on any number of threads, however the work is sliced.
 
+use crate::photon::PHOTONS;
 use crate::scenes::{Setup, volume};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tyndall::film::Image;
 use tyndall::light::{Directional, Environment, Light};
 use tyndall::math::{Rgb, Vec3};
-use tyndall::scene::{Estimate, Histories, IntegratorKind, PhotonSettings, Scene, SpatialHistory};
+use tyndall::scene::{IntegratorKind, PhotonSettings, Scene};
 use tyndall::session::{Budget, Session};
-use tyndall::transfer::{Grouping, Optics, Point};
+use tyndall::transfer::{Optics, Point};
 
 fn scene(integrator: IntegratorKind) -> Scene {
     let value = |p: [usize; 3]| ((p[0] * 5 + p[1] * 3 + p[2] * 7) % 11) as f32 / 10.0;
@@ -45,18 +46,7 @@ fn picture(scene: &Scene, threads: usize, slice: Option<Duration>) -> Image {
 fn threads_and_slices_leave_no_trace() {
     let march = |step| IntegratorKind::RayMarch { step, light_samples: 4 };
     // Without scattering a march stops between samples, of which it then takes many.
-    let photons = IntegratorKind::Photon(PhotonSettings {
-        photons: 20_000,
-        radius: 1.5,
-        segments: 5,
-        steps_per_voxel: 2.0,
-        gather_spacing: 1.5,
-        estimate: Estimate::Point,
-        histories: Histories::Interactions,
-        history_bits: 64,
-        bins: Grouping::Quantile,
-        spatial: SpatialHistory::Cells,
-    });
+    let photons = IntegratorKind::Photon(PhotonSettings { photons: 20_000, segments: 5, ..PHOTONS });
     for (kind, max_scatter) in [(IntegratorKind::Path, 8), (march(0.5), 8), (march(0.01), 0), (photons, 8)] {
         let mut scene = scene(kind);
         scene.render.max_scatter = max_scatter;

@@ -52,6 +52,11 @@ impl Histories {
         self.words.extend_from_slice(&other.words[range.start * self.width..range.end * self.width]);
     }
 
+    /// Lets go of room that is not needed.
+    pub fn shrink_to_fit(&mut self) {
+        self.words.shrink_to_fit();
+    }
+
     pub fn bytes(&self) -> usize {
         4 * self.words.len()
     }

@@ -7,8 +7,9 @@ use crate::volume::Grid;
 const MOST_CELLS: f32 = (1 << 24) as f32;
 
 /// A cell is wider than the radius by more than single precision errs in a place, so that a place put into the cell beside
-/// its own still has all that it gathers in the neighbourhood.
+/// its own still has all that it gathers in the neighbourhood. In a volume of many radii that is a share of its extent.
 const MARGIN: f32 = 1e-4;
+const MARGIN_OF_EXTENT: f32 = 1.0 / (1 << 22) as f32;
 
 /// Bits of one axis of the paper's spatial history.
 const AXIS_BITS: f32 = 64.0;
@@ -21,6 +22,8 @@ pub(super) struct CellGrid {
     linear: Mat3,
     origin: Vec3,
     edge: f32,
+    /// Of the edge.
+    margin: f32,
     per_edge: f32,
     dims: [usize; 3],
     index_reach: Vec3,
@@ -38,7 +41,8 @@ impl CellGrid {
         let (linear, to_index) = (linear.as_mat3(), linear.inverse().as_mat3());
         let around = Bounds::around(grid.index_bounds().corners().map(|p| linear * (p - middle)));
         let cells = |edge: f32| (around.size() / edge).ceil().max(Vec3::ONE);
-        let mut edge = reach * (1.0 + MARGIN);
+        let margin = MARGIN.max(MARGIN_OF_EXTENT * around.size().max_element() / reach);
+        let mut edge = reach * (1.0 + margin);
         while cells(edge).element_product() > MOST_CELLS {
             edge *= 1.1;
         }
@@ -47,8 +51,9 @@ impl CellGrid {
         let rows = to_index.transpose();
         let entries = |row: Vec3| row.abs().element_sum();
         let box_ = Vec3::new(entries(rows.x_axis), entries(rows.y_axis), entries(rows.z_axis));
-        let index_reach = box_ * (2.0 * edge * (1.0 + MARGIN)) + MARGIN;
-        Self { to_index, middle, linear, origin: around.min, edge, per_edge: 1.0 / edge, dims, index_reach }
+        let index_reach = box_ * (2.0 * edge * (1.0 + margin)) + MARGIN;
+        let per_edge = 1.0 / edge;
+        Self { middle, linear, origin: around.min, edge, margin, per_edge, dims, index_reach, to_index }
     }
 
     /// Takes metric vectors to index space.
@@ -123,7 +128,7 @@ impl CellGrid {
 
     /// Bits along each axis that lie in the cell of a metric place or its neighbours.
     pub fn axis_reach(&self, p: Vec3) -> [u64; 3] {
-        let r = 2.0 * self.edge * (1.0 + MARGIN);
+        let r = 2.0 * self.edge * (1.0 + self.margin);
         [0, 1, 2].map(|axis| {
             let [first, last] = [p[axis] - r, p[axis] + r].map(|x| self.axis_bin(x, axis));
             u64::MAX << first & u64::MAX >> (63 - last)

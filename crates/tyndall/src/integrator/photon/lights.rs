@@ -144,13 +144,16 @@ pub(super) fn trace<'s>(
     }
     let unfinished = AtomicUsize::new(work.len());
     work.into_par_iter().with_max_len(1).for_each(|(chunk, source, stream)| {
-        if !stop().reached() {
+        let stop = stop();
+        if !stop.reached() {
             let Ground { reading, enclosure, .. } = ground;
             let tracer = Tracer { scene, source, enclosure, reading };
             let numbers = |path| LightPathSampler::new(seed, pass, stream, path);
-            let paths = ground.level.run(Update { chunk, tracer, numbers: &numbers, places });
-            traced.fetch_add(paths, Ordering::Relaxed);
-            unfinished.fetch_sub(1, Ordering::Relaxed);
+            let update = Update { chunk: &mut *chunk, tracer, numbers: &numbers, places, stop: &stop };
+            traced.fetch_add(ground.level.run(update), Ordering::Relaxed);
+            if chunk.is_valid() {
+                unfinished.fetch_sub(1, Ordering::Relaxed);
+            }
         }
     });
     unfinished.into_inner() == 0

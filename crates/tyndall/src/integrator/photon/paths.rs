@@ -1,5 +1,6 @@
 //! The photon pass: light paths, each of whose interactions knows what it depends on \[Jonsson12, sec. 3.2, 4.3.1\].
 
+use crate::integrator::Stop;
 use crate::integrator::history::{Histories, Past, Reading};
 use crate::light::{Emission, Enclosure, Light};
 use crate::math::{PackedDirection, Ray, Rgb, Vec3};
@@ -63,7 +64,7 @@ pub(super) enum Source<'a> {
 }
 
 /// Interactions of paths, one path after the other, with what each depends on.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) struct Interactions {
     pub photons: Vec<Photon>,
     /// Of each, for flight and scattering; `None` where paths have one alone.
@@ -77,9 +78,9 @@ impl Interactions {
         Self { photons: Vec::new(), pasts }
     }
 
-    /// None yet, kept as those of another.
-    pub fn like(other: &Self, groups: u8) -> Self {
-        Self::new(groups, other.pasts.is_some())
+    /// Whether each interaction has a past of its own.
+    pub fn have_pasts(&self) -> bool {
+        self.pasts.is_some()
     }
 
     /// What an interaction depends on; `None` where that is not known apart from its path.
@@ -107,6 +108,12 @@ impl Interactions {
         }
     }
 
+    /// Lets go of room that is not needed.
+    pub fn shrink_to_fit(&mut self) {
+        self.photons.shrink_to_fit();
+        self.pasts.iter_mut().flatten().for_each(Histories::shrink_to_fit);
+    }
+
     pub fn bytes(&self) -> usize {
         let pasts = self.pasts.iter().flatten().map(Histories::bytes).sum::<usize>();
         size_of_val(&self.photons[..]) + pasts
@@ -131,7 +138,16 @@ pub(super) struct Begun {
     pub past: Past,
 }
 
+/// A path on its way.
+#[derive(Clone, Debug)]
+pub(super) struct Walk {
+    /// `None` where it has ended.
+    flight: Option<Flight>,
+    pub past: Past,
+}
+
 /// Light on its way between two interactions.
+#[derive(Clone, Debug)]
 struct Flight {
     ray: Ray,
     flux: Rgb,
@@ -149,27 +165,41 @@ impl Tracer<'_> {
         self.reading.of(self.medium().transfer().bins(), self.medium().volume().value(place))
     }
 
-    /// Traces a path, from its beginning or on from one of its interactions, and gives what the whole of it depends on: also
-    /// what it did not hit.
+    /// A path at its beginning, or where it is to go on from one of its interactions.
     #[inline(always)]
-    pub fn trace(&self, numbers: &LightPathSampler, from: Option<Begun>, found: &mut Interactions) -> Past {
+    pub fn begin(&self, numbers: &LightPathSampler, from: Option<Begun>) -> Walk {
         let mut past = from.map_or(Past::NOTHING, |from| from.past);
-        let begun = match from {
+        let flight = match from {
             Some(Begun { photon, bounce, .. }) => self.scatter(&photon, bounce, numbers, &mut past),
             None => self.emit(numbers),
         };
-        let Some(mut flight) = begun else { return past };
-        while let Some(photon) = self.fly(&flight, numbers, &mut past) {
+        Walk { flight, past }
+    }
+
+    /// Goes on to the path's end, or for one scattering at least when told to stop; gives whether it has ended. Then the walk's
+    /// past is what the whole path depends on: also what it did not hit.
+    #[inline(always)]
+    pub fn go_on(
+        &self,
+        walk: &mut Walk,
+        numbers: &LightPathSampler,
+        found: &mut Interactions,
+        stop: &Stop,
+    ) -> bool {
+        while let Some(flight) = walk.flight.take() {
+            let Some(photon) = self.fly(&flight, numbers, &mut walk.past) else { break };
             if is_kept(numbers, flight.bounce) {
-                found.push(photon, &past);
+                found.push(photon, &walk.past);
             }
             if flight.bounce + 1 >= self.scene.render.max_scatter {
                 break;
             }
-            let Some(next) = self.scatter(&photon, flight.bounce, numbers, &mut past) else { break };
-            flight = next;
+            walk.flight = self.scatter(&photon, flight.bounce, numbers, &mut walk.past);
+            if walk.flight.is_some() && stop.reached() {
+                return false;
+            }
         }
-        past
+        true
     }
 
     fn emit(&self, numbers: &LightPathSampler) -> Option<Flight> {
