@@ -37,8 +37,10 @@ pub struct Args {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Render a scene or a bare volume to pictures
+    #[command(allow_negative_numbers = true)]
     Render(Box<RenderOptions>),
     /// Play a list of edits against a live session: how fast each is, and how much was computed again
+    #[command(allow_negative_numbers = true)]
     Replay(Box<ReplayOptions>),
     /// Tell what the loader understands of a volume or of a scene's volume
     Info(InfoOptions),

@@ -1,23 +1,33 @@
 //! Edits files: a JSON list of named merge patches.
 
 use crate::Failure;
-use crate::input::{in_file, read_text};
+use crate::input::read_text;
 use serde_json::Value;
 use std::path::Path;
 use tyndall::message::{excerpt, quoted};
-use tyndall::scene::document;
+use tyndall::scene::document::{self, DocumentError};
 
 /// One edit.
 pub struct Edit {
     /// For reports; `edit 3` where the file gives none.
     pub name: String,
+    /// Which one it is, for messages: by number, and by name if it has one.
+    pub at: String,
     /// A JSON Merge Patch on the scene document, a table.
     pub patch: Value,
 }
 
 /// The edits of a file, not yet looked at one by one, so that those before a bad one are still played.
 pub fn read(path: &Path) -> Result<Vec<Value>, Failure> {
-    match in_file(path, document::value_from_json(&read_text(path)?))? {
+    let what = "a list of edits";
+    let value = document::value_from_json(&read_text(path, what)?).map_err(|e| match e {
+        DocumentError::Syntax { line, column, message, .. } => Failure::input(format!(
+            "{}: line {line}, column {column}: {message}; expected {what} in JSON",
+            tyndall::message::place(path)
+        )),
+        other => Failure::input(format!("{}: {other}", tyndall::message::place(path))),
+    })?;
+    match value {
         Value::Array(edits) => Ok(edits),
         other => Err(Failure::input(format!(
             "{}: found {}, expected a list of edits: [{{\"name\": ..., \"patch\": {{...}}}}, ...]",
@@ -36,14 +46,13 @@ impl Edit {
         if let Some(unknown) = table.keys().find(|key| !["name", "patch"].contains(&key.as_str())) {
             return Err(format!("{at}: unknown key {}, {expected}", quoted(unknown)));
         }
-        let name = match table.get("name") {
-            None => at.clone(),
-            Some(Value::String(name)) => name.clone(),
+        let (name, at) = match table.get("name") {
+            None => (at.clone(), at),
+            Some(Value::String(name)) => (name.clone(), format!("{at} (`{}`)", excerpt(name))),
             Some(other) => return Err(format!("{at}: `name`: found {}, expected a text", kind(other))),
         };
-        let at = format!("{at} (`{}`)", excerpt(&name));
         match table.get("patch") {
-            Some(patch @ Value::Object(_)) => Ok(Self { name, patch: patch.clone() }),
+            Some(patch @ Value::Object(_)) => Ok(Self { name, at, patch: patch.clone() }),
             Some(other) => {
                 Err(format!("{at}: `patch`: found {}, expected a table of what changes", kind(other)))
             }

@@ -5,6 +5,7 @@ use crate::input::Input;
 use crate::{Failure, say};
 use serde_json::json;
 use std::fmt::Write;
+use tyndall::math::Vec3;
 use tyndall::message::sentence;
 use tyndall::scene::document::FieldKind;
 use tyndall::transfer::Preset;
@@ -43,6 +44,7 @@ fn as_json(volume: &Volume, source: &Source) -> serde_json::Value {
         "spacing": grid.spacing(),
         "direction": grid.direction(),
         "origin": grid.origin(),
+        "bounds": [grid.world_bounds().min.to_array(), grid.world_bounds().max.to_array()],
         "space": space(volume),
         "value_range": volume.value_range(),
         "robust_range": volume.robust_range(),
@@ -53,6 +55,10 @@ fn as_json(volume: &Volume, source: &Source) -> serde_json::Value {
         "preset": Preset::for_volume(volume).name,
         "notes": source.notes,
     })
+}
+
+fn corner(p: Vec3) -> String {
+    format!("({}, {}, {})", p.x, p.y, p.z)
 }
 
 fn space(volume: &Volume) -> &'static str {
@@ -69,11 +75,13 @@ fn as_text(volume: &Volume, source: &Source) -> String {
     let [ox, oy, oz] = grid.origin();
     let [lo, hi] = volume.value_range();
     let [robust_lo, robust_hi] = volume.robust_range();
-    let size = grid.world_bounds().size();
+    let bounds = grid.world_bounds();
+    let (size, corners) = (bounds.size(), [bounds.min, bounds.max]);
     let mut text = format!(
         "voxels     {nx} x {ny} x {nz} of {}\n\
          spacing    {sx} x {sy} x {sz}\n\
          size       {} x {} x {}\n\
+         bounds     {} to {}\n\
          origin     {ox}, {oy}, {oz}\n\
          direction  {:?}\n\
          space      {}\n\
@@ -84,6 +92,8 @@ fn as_text(volume: &Volume, source: &Source) -> String {
         size.x,
         size.y,
         size.z,
+        corner(corners[0]),
+        corner(corners[1]),
         grid.direction(),
         space(volume),
         source.channels,

@@ -36,14 +36,14 @@ impl Input {
         let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
         let scene = |value| Ok(Self { value, folder: folder.clone(), bare: false });
         match extension.as_str() {
-            "toml" => scene(in_file(path, document::value_from_toml(&read_text(path)?))?),
-            "json" => scene(in_file(path, document::value_from_json(&read_text(path)?))?),
+            "toml" => scene(in_file(path, document::value_from_toml(&read_text(path, "a scene document")?))?),
+            "json" => scene(in_file(path, document::value_from_json(&read_text(path, "a scene document")?))?),
             "png" | "jpg" | "jpeg" | "tif" | "tiff" | "exr" => {
                 let metadata = read_metadata(path).map_err(Failure::input)?;
                 let text = metadata.as_ref().and_then(|m| m.get(Metadata::SCENE)).ok_or_else(|| {
                     Failure::input(format!(
                         "{}: a picture without a scene in its metadata; expected one that Tyndall made, a scene \
-                         (.toml, .json) or a volume",
+                         (.toml, .json) or a volume (NRRD, NIfTI, MetaImage, NumPy)",
                         place(path)
                     ))
                 })?;
@@ -109,7 +109,7 @@ impl Input {
 }
 
 /// Why what a document names cannot be had.
-pub fn of_assets(error: &AssetError, document: &Path) -> Failure {
+fn of_assets(error: &AssetError, document: &Path) -> Failure {
     match error {
         AssetError::Volume(_) => Failure::input(error),
         // Of the others each begins with a key.
@@ -122,20 +122,21 @@ pub fn in_file<T>(path: &Path, result: Result<T, document::DocumentError>) -> Re
     result.map_err(|e| Failure::input(format!("{}: {e}", place(path))))
 }
 
-pub fn read_text(path: &Path) -> Result<String, Failure> {
+/// The text of a file that should be `what`.
+pub fn read_text(path: &Path, what: &str) -> Result<String, Failure> {
     let fail = |problem: &dyn std::fmt::Display| Failure::input(format!("{}: {problem}", place(path)));
     let unreadable = |e| fail(&format!("cannot be read: {e}; check the path"));
     let about = std::fs::metadata(path).map_err(unreadable)?;
     if !about.is_file() {
-        return Err(fail(&"not a file; expected a scene document"));
+        return Err(fail(&format!("not a file; expected {what}")));
     }
     if about.len() > LARGEST_DOCUMENT {
-        return Err(fail(&format!("{} bytes; a scene document has at most {LARGEST_DOCUMENT}", about.len())));
+        return Err(fail(&format!("{} bytes; {what} has at most {LARGEST_DOCUMENT}", about.len())));
     }
     let needed = about.len().saturating_mul(MEMORY_PER_BYTE);
     if let Some(available) = tyndall_formats::memory::available().filter(|&available| needed > available) {
         return Err(fail(&format!(
-            "a scene document of {} MiB takes up to {} MiB of memory, but {} MiB are free; expected a smaller one",
+            "{what} of {} MiB takes up to {} MiB of memory, but {} MiB are free; expected a smaller one",
             about.len() >> 20,
             needed >> 20,
             available >> 20
@@ -143,6 +144,6 @@ pub fn read_text(path: &Path) -> Result<String, Failure> {
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
     String::from_utf8(bytes).map_err(|e| {
-        fail(&format!("byte {} is no UTF-8; save the scene as UTF-8", e.utf8_error().valid_up_to()))
+        fail(&format!("byte {} is no UTF-8; expected {what} in UTF-8", e.utf8_error().valid_up_to()))
     })
 }

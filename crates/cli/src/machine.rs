@@ -1,12 +1,10 @@
 //! What the machine gives a run: threads, vector instructions, memory, and the user's Ctrl-C.
 
 use crate::Failure;
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tyndall::film::Film;
 use tyndall::integrator::PhotonMapping;
-use tyndall::message::place;
 use tyndall::scene::document::Document;
 use tyndall::scene::{IntegratorKind, RenderSettings};
 use tyndall::simd::Level;
@@ -69,14 +67,13 @@ impl Interrupt {
     }
 }
 
-/// Refuses a film for which there is no memory.
-pub fn check_film(size: [u32; 2], input: &Path) -> Result<(), Failure> {
+/// Refuses a film for which there is no memory; `at` says what asks for it.
+pub fn check_film(size: [u32; 2], at: &str) -> Result<(), Failure> {
     // The film, the picture with its layers, and the encoder's copy of it.
     let needed = 3 * Film::bytes(size);
     match tyndall_formats::memory::available() {
         Some(available) if needed > available => Err(Failure::input(format!(
-            "{}: film.size: {} x {} pixels need {} MiB, but {} MiB are free; expected a smaller picture",
-            place(input),
+            "{at}: film.size: {} x {} pixels need {} MiB, but {} MiB are free; expected a smaller picture",
             size[0],
             size[1],
             needed >> 20,
@@ -93,15 +90,14 @@ pub fn sample_memory(document: &Document) -> usize {
     usize::try_from(asked.min(free)).unwrap_or(usize::MAX)
 }
 
-/// Refuses photons for which there is no memory.
-pub fn check_photons(render: &RenderSettings, size: [u32; 2], input: &Path) -> Result<(), Failure> {
+/// Refuses photons for which there is no memory; `at` says what asks for them.
+pub fn check_photons(render: &RenderSettings, size: [u32; 2], at: &str) -> Result<(), Failure> {
     let IntegratorKind::Photon(settings) = render.integrator else { return Ok(()) };
     let needed = PhotonMapping::most_bytes(&settings, render.max_scatter, size);
     match tyndall_formats::memory::available() {
         Some(available) if needed > available => Err(Failure::input(format!(
-            "{}: render.photon.photons: {} light paths of up to {} scatterings and {} segments a pixel may need {} MiB, but {} MiB \
+            "{at}: render.photon.photons: {} light paths of up to {} scatterings and {} segments a pixel may need {} MiB, but {} MiB \
              are free; expected fewer of them",
-            place(input),
             settings.photons,
             render.max_scatter,
             settings.segments,

@@ -50,11 +50,12 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     input.override_with(&options.scene, options.samples)?;
     let (document, assets, source) = threads.install(|| input.load(&options.input))?;
     let load_s = stages.end("load");
-    check_film(document.film.size, &options.input)?;
+    let at = place(&options.input);
+    check_film(document.film.size, &at)?;
     let scene = threads
         .install(|| Scene::build(&document, &assets))
-        .map_err(|e| Failure::input(format!("{}: {e}", place(&options.input))))?;
-    check_photons(&scene.render, scene.size, &options.input)?;
+        .map_err(|e| Failure::input(format!("{at}: {e}")))?;
+    check_photons(&scene.render, scene.size, &at)?;
     if !options.run.quiet {
         for text in source.notes.iter().map(String::as_str).chain(scene.notes()) {
             drop(writeln!(std::io::stderr(), "tyndall: note: {}", sentence(text)));
@@ -82,7 +83,21 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let rendered = stages.end("render");
     let interrupted = interrupt.asked();
     if interrupted && session.film().mean_samples() == 0.0 {
+        if !options.run.quiet {
+            drop(writeln!(std::io::stderr(), "tyndall: interrupted before there was anything to write"));
+        }
         return Err(Failure::Interrupted);
+    }
+    if let Some(time) =
+        stop.time.filter(|time| session.film().samples() <= 1 && rendered > 1.5 * time.as_secs_f64())
+        && !interrupted
+        && !options.run.quiet
+    {
+        drop(writeln!(
+            std::io::stderr(),
+            "tyndall: note: the first sample of every pixel, without which there is no picture, took {rendered:.1} s of the {} s asked for",
+            time.as_secs_f64()
+        ));
     }
     note(&format!("{:.2} samples per pixel in {rendered:.2} s", session.film().mean_samples()));
 

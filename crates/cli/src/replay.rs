@@ -2,7 +2,7 @@
 
 use crate::args::ReplayOptions;
 use crate::edits::{self, Edit};
-use crate::input::{Input, of_assets};
+use crate::input::Input;
 use crate::machine::{Interrupt, check_film, check_photons, pool, sample_memory, vector_instructions};
 use crate::{Failure, output, say};
 use serde_json::{Map, Value, json};
@@ -49,16 +49,15 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
         let report = Edit::read(edit, number)
             .map_err(|e| Failure::input(format!("{}: {e}", place(&options.edits))))
             .and_then(|edit| {
-                let name = edit.name.clone();
-                let report = live.play(&edit, options.verify);
-                let at = format!("{}: edit {} (`{}`)", place(&options.edits), number + 1, excerpt(&name));
-                report.map(|r| (name, r)).map_err(|e| e.within(&at))
+                let at = format!("{}: {}", place(&options.edits), edit.at);
+                live.play(&edit, &at, options.verify).map(|report| (edit.name, report))
             });
         match report {
             Ok((name, report)) => {
                 if show {
                     say(&report.line(&name))?;
                 }
+                report.warn(&name);
                 reports.push(report.to_value(&name));
             }
             Err(failure) => {
@@ -80,11 +79,12 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
         });
         output::statistics(place, &statistics)?;
     }
-    played?;
+    // Also before a bad edit: nothing is lost.
     if !options.outputs.is_empty() && live.session.film().samples() > 0 {
         live.refine(live.document.render.samples);
         output::pictures(&options.outputs, live.session.film(), &live.document, &live.input.folder)?;
     }
+    played?;
     if interrupt.asked() { Err(Failure::Interrupted) } else { Ok(()) }
 }
 
@@ -92,7 +92,6 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
 struct Live<'a> {
     /// Where the document comes from.
     input: Input,
-    path: &'a Path,
     /// The document as it was typed, with all edits so far.
     value: Value,
     document: Document,
@@ -106,6 +105,9 @@ struct Live<'a> {
 
 /// What one edit cost, and what it came to.
 struct Report {
+    /// Method and size of the picture.
+    integrator: &'static str,
+    size: [u32; 2],
     latency_s: f64,
     recomputed: Vec<(&'static str, f64)>,
     check: Option<Check>,
@@ -128,10 +130,16 @@ struct Check {
     false_positives: Option<usize>,
 }
 
+impl Check {
+    fn fails(&self) -> bool {
+        self.max_abs_diff > 0.0 || self.false_negatives > 0
+    }
+}
+
 impl<'a> Live<'a> {
     fn open(
         mut input: Input,
-        path: &'a Path,
+        path: &Path,
         pool: Arc<rayon::ThreadPool>,
         level: Level,
         interrupt: &'a Interrupt,
@@ -142,11 +150,12 @@ impl<'a> Live<'a> {
             // Chosen by the volume, and no edit's to lose.
             value = document::apply(&json!({ "medium": { "density": document.medium.density } }), &value);
         }
-        check_film(document.film.size, path)?;
-        let scene = build(&pool, &document, &assets, path)?;
+        let at = place(path);
+        check_film(document.film.size, &at)?;
+        let scene = build(&pool, &document, &assets, &at)?;
         let mut session = Session::with_level(scene, pool.clone(), level);
         session.keep_samples(sample_memory(&document));
-        Ok(Self { input, path, value, document, assets, session, pool, level, interrupt, told: source.notes })
+        Ok(Self { input, value, document, assets, session, pool, level, interrupt, told: source.notes })
     }
 
     /// Tells once what the user should know.
@@ -161,8 +170,8 @@ impl<'a> Live<'a> {
         refine(&mut self.session, samples, self.interrupt);
     }
 
-    /// Applies an edit, and renders until every pixel has a sample of the new scene.
-    fn play(&mut self, edit: &Edit, verify: bool) -> Result<Report, Failure> {
+    /// Applies an edit, and renders until every pixel has a sample of the new scene; `at` says which edit it is.
+    fn play(&mut self, edit: &Edit, at: &str, verify: bool) -> Result<Report, Failure> {
         let before = verify.then(|| {
             self.refine(self.document.render.samples);
             Before {
@@ -174,9 +183,9 @@ impl<'a> Live<'a> {
 
         let begun = Instant::now();
         let value = document::apply(&self.value, &edit.patch);
-        let (document, assets) = self.parse(&value)?;
-        check_film(document.film.size, self.path)?;
-        let scene = build(&self.pool, &document, &assets, self.path)?;
+        let (document, assets) = self.parse(&value, at)?;
+        check_film(document.film.size, at)?;
+        let scene = build(&self.pool, &document, &assets, at)?;
         if document.render.path != self.document.render.path {
             self.session.keep_samples(sample_memory(&document));
         }
@@ -188,25 +197,32 @@ impl<'a> Live<'a> {
             return Err(Failure::Interrupted);
         }
         let recomputed = self.session.recomputed().to_vec();
-        let check = before.map(|before| self.check(&recomputed, &before)).transpose()?;
-        Ok(Report { latency_s, recomputed, check })
+        let check = before.map(|before| self.check(at, &recomputed, &before)).transpose()?;
+        let (integrator, size) = (self.session.scene().render.integrator.name(), self.document.film.size);
+        Ok(Report { integrator, size, latency_s, recomputed, check })
     }
 
     /// The document of an edited value, through the parser, with what it names.
-    fn parse(&self, value: &Value) -> Result<(Document, Assets), Failure> {
-        let document = Document::from_value(value.clone()).map_err(Failure::input)?;
+    fn parse(&self, value: &Value, at: &str) -> Result<(Document, Assets), Failure> {
+        let document =
+            Document::from_value(value.clone()).map_err(|e| Failure::input(format!("{at}: {e}")))?;
         let assets = self
             .pool
             .install(|| assets::reload(&document, &self.input.folder, (&self.document, &self.assets)))
-            .map_err(|e| of_assets(&e, self.path))?;
+            .map_err(|e| Failure::input(format!("{at}: {e}")))?;
         Ok((document, assets))
     }
 
     /// Renders the edited scene from nothing, and compares.
-    fn check(&mut self, recomputed: &[(&'static str, f64)], before: &Before) -> Result<Check, Failure> {
+    fn check(
+        &mut self,
+        at: &str,
+        recomputed: &[(&'static str, f64)],
+        before: &Before,
+    ) -> Result<Check, Failure> {
         let begun = Instant::now();
-        let (document, assets) = self.parse(&self.value)?;
-        let scene = build(&self.pool, &document, &assets, self.path)?;
+        let (document, assets) = self.parse(&self.value, at)?;
+        let scene = build(&self.pool, &document, &assets, at)?;
         let mut fresh = Session::with_level(scene, self.pool.clone(), self.level);
         fresh.keep_samples(sample_memory(&document));
         refine(&mut fresh, 1, self.interrupt);
@@ -241,16 +257,10 @@ fn refine(session: &mut Session, samples: u32, interrupt: &Interrupt) {
     session.refine(&Budget { cancel: interrupt.flag(), ..Budget::samples(samples) });
 }
 
-fn build(
-    pool: &rayon::ThreadPool,
-    document: &Document,
-    assets: &Assets,
-    path: &Path,
-) -> Result<Scene, Failure> {
-    let scene = pool
-        .install(|| Scene::build(document, assets))
-        .map_err(|e| Failure::input(format!("{}: {e}", place(path))))?;
-    check_photons(&scene.render, scene.size, path)?;
+fn build(pool: &rayon::ThreadPool, document: &Document, assets: &Assets, at: &str) -> Result<Scene, Failure> {
+    let scene =
+        pool.install(|| Scene::build(document, assets)).map_err(|e| Failure::input(format!("{at}: {e}")))?;
+    check_photons(&scene.render, scene.size, at)?;
     Ok(scene)
 }
 
@@ -286,10 +296,30 @@ impl Report {
         line + "\n"
     }
 
+    /// Says so where the picture is not the one from nothing.
+    fn warn(&self, name: &str) {
+        if let Some(check) = self.check.as_ref().filter(|check| check.fails()) {
+            drop(writeln!(
+                std::io::stderr(),
+                "tyndall: warning: edit `{}`: the picture differs from the one from nothing by up to {:.2e}, and {} parts of it were \
+                 kept and are wrong",
+                excerpt(name),
+                check.max_abs_diff,
+                check.false_negatives
+            ));
+        }
+    }
+
     fn to_value(&self, name: &str) -> Value {
         let shares: Map<_, _> =
             self.recomputed.iter().map(|&(name, share)| (name.into(), json!(share))).collect();
-        let mut value = json!({ "name": name, "latency_s": self.latency_s, "recomputed": shares });
+        let mut value = json!({
+            "name": name,
+            "integrator": self.integrator,
+            "size": self.size,
+            "latency_s": self.latency_s,
+            "recomputed": shares,
+        });
         if let Some(check) = &self.check {
             value["scratch_s"] = json!(check.scratch_s);
             value["speedup"] = json!(check.scratch_s / self.latency_s);

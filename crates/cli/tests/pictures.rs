@@ -363,6 +363,7 @@ fn what_the_loader_understood_is_told() {
         ("spacing", serde_json::json!([2.0, 3.0, 4.0])),
         ("direction", serde_json::json!([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])),
         ("origin", serde_json::json!([5.0, 6.0, 7.0])),
+        ("bounds", serde_json::json!([[4.0, 4.5, 5.0], [10.0, 10.5, 9.0]])),
         ("value_range", serde_json::json!([-1000.0, 500.0])),
         ("channels", serde_json::json!(1)),
         ("times", serde_json::json!(1)),

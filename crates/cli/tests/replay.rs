@@ -140,17 +140,55 @@ fn a_bad_edit_keeps_the_reports_before_it() {
     }
 }
 
+/// What a bad edit names is looked for in the edits file, not in the scene; and what there was before it is not lost.
+#[test]
+fn a_bad_edit_leaves_the_picture_before_it() {
+    let edit = json!({ "patch": { "medium": { "density": 2 } } });
+    for bad in [
+        json!({ "patch": { "transfer_function": { "preset": "ct-bon" } } }),
+        json!({ "patch": { "volume": { "path": "none.nrrd" } } }),
+        json!({ "patch": { "lights": [{ "type": "environment", "map": "none.exr" }] } }),
+    ] {
+        let folder = with(&json!([edit, bad]));
+        let (told, ended) = replay(&folder, &["-o", "before.png"]);
+        assert_eq!((ended.status, &told["edits"][0]["size"]), (Some(1), &json!([16, 16])));
+        let message = &ended.stderr;
+        assert!(message.contains("edits.json: edit 2: "), "{message}");
+        assert!(!message.contains("scene.toml") && !message.contains("`edit 2`"), "{message}");
+        let whole = folder.run(&["render", "../scene.toml", "--set", "medium.density=2", "-o", "whole.png"]);
+        assert_eq!(whole.status, Some(0));
+        let [before, whole] = ["before.png", "whole.png"]
+            .map(|name| std::fs::read(folder.at("out").join(name)).expect("a file"));
+        assert!(before == whole);
+    }
+}
+
+/// With `spatial = "off"` light stays where it was, as in the paper.
+#[test]
+fn a_picture_that_is_not_the_one_from_nothing_is_warned_of() {
+    let lights = json!([{ "type": "point", "position": [0, 20, 0], "intensity": [900, 900, 900] }]);
+    let folder = with(&json!([{ "patch": { "lights": lights } }, { "patch": {} }]));
+    let photon = ["--verify", "--integrator", "photon", "--set", "render.photon.photons=5000"];
+    for (spatial, warned) in [("render.photon.spatial=off", true), ("render.photon.spatial=cells", false)] {
+        let (told, ended) = replay(&folder, &[&photon[..], &["--set", spatial]].concat());
+        assert_eq!(ended.status, Some(0));
+        let wrong = told["edits"][0]["max_abs_diff"].as_f64() > Some(0.0);
+        let warning = "warning: edit `edit 1`: the picture differs";
+        assert_eq!((wrong, ended.stderr.contains(warning)), (warned, warned), "{}", ended.stderr);
+    }
+}
+
 #[test]
 fn what_is_no_edits_file_is_told_before_the_work() {
     let mut deep = "[".repeat(100_000);
     deep.push_str(&"]".repeat(100_000));
     for (edits, says) in [
-        (&b""[..], "edits.json: "),
+        (&b""[..], "expected a list of edits in JSON"),
         (b"{}", "expected a list of edits"),
         (b"3", "expected a list of edits"),
         (b"[{]", "line 1"),
-        (b"[{\"patch\": {}}", "edits.json: "),
-        (b"\xff\xfe", "no UTF-8"),
+        (b"[{\"patch\": {}}", "expected a list of edits in JSON"),
+        (b"\xff\xfe", "no UTF-8; expected a list of edits"),
         (deep.as_bytes(), "edits.json: "),
     ] {
         let files = vec![("scene.toml", SCENE.into()), ("edits.json", edits.to_vec())];
@@ -160,7 +198,8 @@ fn what_is_no_edits_file_is_told_before_the_work() {
     let files = || vec![("scene.toml", SCENE.into())];
     for (arguments, status, says) in [
         (vec!["replay", "../scene.toml", "../none.json"], 1, "none.json"),
-        (vec!["replay", "../scene.toml", ".."], 1, "not a file"),
+        (vec!["replay", "../scene.toml", ".."], 1, "not a file; expected a list of edits"),
+        (vec!["replay", "../scene.toml", "../e.json", "--max-scatter", "-1"], 2, "-1 is not in"),
         (vec!["replay", "../scene.toml"], 2, "<EDITS>"),
         (vec!["replay", "../scene.toml", "../e.json", "-o", "a.gif"], 2, "a.gif"),
     ] {
