@@ -194,7 +194,7 @@ fn assignments_reach_every_part_of_a_scene() {
     assert!(brightness(&folder, &switched) > 0.0);
     // What is patched replaces its alternative, and an option of the command line replaces both.
     let clear = "transfer_function.points=[{\"value\":0,\"opacity\":0}]";
-    assert_eq!(brightness(&folder, &["--set", lamp, "--set", clear]), 0.0);
+    assert_eq!(brightness(&folder, &["-q", "--set", lamp, "--set", clear]), 0.0);
     let solid = ["--set", lamp, "--set", clear, "--set", "transfer_function.preset=solid"];
     assert!(brightness(&folder, &solid) > 0.0);
     assert!(brightness(&folder, &["--set", lamp, "--set", clear, "--preset", "solid"]) > 0.0);
@@ -329,6 +329,26 @@ fn a_part_that_is_not_shown_is_noted() {
     assert_eq!(status, Some(0), "{stderr}");
     assert_eq!(stderr, "tyndall: note: 3 time steps: the first was read\n");
     run(&folder, &[&arguments[..], &["-q"]].concat());
+}
+
+#[test]
+fn a_picture_without_matter_is_noted() {
+    let folder = Folder::new();
+    folder.put("scene.toml", SCENE);
+    let clip =
+        |normal: &str| format!("clip=[{{\"type\":\"plane\",\"point\":[0,99,0],\"normal\":[0,{normal},0]}}]");
+    for (assignment, note) in [
+        (
+            "transfer_function.points=[{\"value\":1.5,\"opacity\":0},{\"value\":2,\"opacity\":1}]",
+            "no value of the data has any opacity",
+        ),
+        (&clip("-1"), "a clip cuts the whole volume away"),
+        (&clip("1"), ""),
+    ] {
+        let Ended { status, stderr, .. } = folder.run(&["render", "../scene.toml", "--set", assignment]);
+        assert_eq!(status, Some(0), "{stderr}");
+        assert!(stderr.contains(note) && stderr.is_empty() == note.is_empty(), "{assignment}: {stderr}");
+    }
 }
 
 #[test]

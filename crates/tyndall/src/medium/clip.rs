@@ -90,6 +90,14 @@ impl Clip {
         stretch
     }
 
+    /// Whether one plane alone leaves nothing of a box in index space.
+    #[must_use]
+    pub fn cuts_all(&self, bounds: &Bounds) -> bool {
+        let beyond =
+            |half: &HalfSpace| bounds.corners().into_iter().all(|p| half.normal.dot(p) > half.offset);
+        self.half_spaces.iter().any(beyond)
+    }
+
     /// Whether an index-space point is left.
     pub(super) fn keeps(&self, p: Vec3) -> bool {
         self.half_spaces.iter().all(|half| half.normal.dot(p) <= half.offset)

@@ -149,6 +149,14 @@ impl Scene {
         let marching = matches!(self.render.integrator, IntegratorKind::RayMarch { .. });
         let bends = self.medium.transfer().points().iter().any(|p| p.optics.ior != 1.0);
         let mut notes = Vec::new();
+        let volume = self.medium.volume();
+        let values = volume.value_range().map(crate::math::cast::single);
+        if self.medium.transfer().opacity_range(values)[1] <= 0.0 {
+            notes.push("no value of the data has any opacity: nothing of the volume can be seen");
+        }
+        if self.medium.clip().cuts_all(&volume.grid().index_bounds()) {
+            notes.push("a clip cuts the whole volume away");
+        }
         if marching && self.medium.transfer().emits() {
             notes.push(
                 "`raymarch` leaves out the light that glowing matter sends to other matter; `path` has it",
