@@ -4,7 +4,7 @@ use crate::Failure;
 use crate::input::read_text;
 use serde_json::Value;
 use std::path::Path;
-use tyndall::message::{excerpt, quoted};
+use tyndall::message::{excerpt, place, quoted};
 use tyndall::scene::document::{self, DocumentError};
 
 /// One edit.
@@ -23,15 +23,15 @@ pub fn read(path: &Path) -> Result<Vec<Value>, Failure> {
     let value = document::value_from_json(&read_text(path, what)?).map_err(|e| match e {
         DocumentError::Syntax { line, column, message, .. } => Failure::input(format!(
             "{}: line {line}, column {column}: {message}; expected {what} in JSON",
-            tyndall::message::place(path)
+            place(path)
         )),
-        other => Failure::input(format!("{}: {other}", tyndall::message::place(path))),
+        other => Failure::input(format!("{}: {other}", place(path))),
     })?;
     match value {
         Value::Array(edits) => Ok(edits),
         other => Err(Failure::input(format!(
             "{}: found {}, expected a list of edits: [{{\"name\": ..., \"patch\": {{...}}}}, ...]",
-            tyndall::message::place(path),
+            place(path),
             kind(&other)
         ))),
     }

@@ -88,15 +88,13 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         }
         return Err(Failure::Interrupted);
     }
-    if let Some(time) =
-        stop.time.filter(|time| session.film().samples() <= 1 && rendered > 1.5 * time.as_secs_f64())
-        && !interrupted
-        && !options.run.quiet
-    {
+    let late = |time: &Duration| session.film().samples() == 1 && rendered > 2.0 * time.as_secs_f64() + 0.5;
+    if let Some(time) = stop.time.filter(late).filter(|_| !options.run.quiet) {
+        let why = "the first sample of every pixel, without which a picture has holes,";
+        let asked = time.as_secs_f64();
         drop(writeln!(
             std::io::stderr(),
-            "tyndall: note: the first sample of every pixel, without which there is no picture, took {rendered:.1} s of the {} s asked for",
-            time.as_secs_f64()
+            "tyndall: note: {why} took {rendered:.1} s of the {asked} s asked for"
         ));
     }
     note(&format!("{:.2} samples per pixel in {rendered:.2} s", session.film().mean_samples()));

@@ -3,9 +3,11 @@
 
 mod support;
 
-use std::process::{Command, Stdio};
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, ChildStderr, Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{Ended, Folder};
+use support::{Ended, Folder, decode, files_in_out, written};
+use tyndall_formats::image::{Metadata, read_metadata};
 
 const SCENE: &str = "\
     volume.procedural = { kind = 'cloud', size = [12, 12, 12] }\n\
@@ -16,12 +18,6 @@ fn with_scene() -> Folder {
     let folder = Folder::new();
     folder.put("scene.toml", SCENE);
     folder
-}
-
-/// The names in the folder in which the program ran.
-fn files_in_out(folder: &Folder) -> Vec<String> {
-    let entries = std::fs::read_dir(folder.at("out")).expect("a folder");
-    entries.map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned()).collect()
 }
 
 /// Runs what must fail with status 1 and one message, which it returns.
@@ -145,6 +141,63 @@ fn statistics_go_to_devices_and_pipes() {
 fn interrupt(process: u32) {
     let sent = Command::new("kill").args(["-INT", &process.to_string()]).status().expect("kill runs");
     assert!(sent.success());
+}
+
+/// A render that says when its scene is loaded, which is now, and what it goes on to say.
+#[cfg(unix)]
+fn started(folder: &Folder, options: &[&str]) -> (Child, BufReader<ChildStderr>) {
+    let arguments = ["render", "../scene.toml", "--samples", "2000000000", "-v", "-o", "a.png"];
+    let mut command = folder.tyndall(&[&arguments[..], options].concat());
+    let mut child = command.stderr(Stdio::piped()).spawn().expect("the program starts");
+    let mut stderr = BufReader::new(child.stderr.take().expect("a pipe"));
+    let mut line = String::new();
+    stderr.read_line(&mut line).expect("a line");
+    assert!(line.starts_with("tyndall: loaded in "), "{line}");
+    (child, stderr)
+}
+
+/// Ends it by Ctrl-C; gives what it said.
+#[cfg(unix)]
+fn interrupted((mut child, mut stderr): (Child, BufReader<ChildStderr>)) -> String {
+    interrupt(child.id());
+    let status = child.wait().expect("a status");
+    let mut rest = String::new();
+    stderr.read_to_string(&mut rest).expect("text");
+    assert_eq!(status.code(), Some(130), "{rest}");
+    assert!(!rest.contains("panicked"), "{rest}");
+    rest
+}
+
+/// Ctrl-C in the middle of a render: what is there is written, and the status says so.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_render_leaves_a_readable_picture() {
+    let folder = with_scene();
+    let render = started(&folder, &[]);
+    // Long enough for a pass over all of 256 pixels.
+    std::thread::sleep(Duration::from_millis(500));
+    interrupted(render);
+    assert_eq!(files_in_out(&folder), ["a.png"]);
+    let (size, _, pixels) = decode(&written(&folder, "a.png"));
+    assert!(size == [16, 16] && pixels.iter().any(|&x| x > 100), "{size:?}");
+    let metadata = read_metadata(&folder.at("out/a.png")).expect("a picture").expect("metadata");
+    let samples: u32 = metadata.get(Metadata::SAMPLES).expect("samples").parse().expect("a number");
+    assert!((1..2_000_000_000).contains(&samples), "{samples}");
+}
+
+/// Light paths of up to a million scatterings in white, dense matter: minutes before there is a first picture.
+#[cfg(unix)]
+#[test]
+fn a_render_interrupted_before_its_first_sample_says_so() {
+    let folder = with_scene();
+    let white = "transfer_function.points=[{\"value\":0,\"opacity\":1,\"albedo\":1}]";
+    let photon =
+        ["--integrator", "photon", "--max-scatter", "1000000", "--set", white, "--set", "medium.density=900"];
+    let render = started(&folder, &photon);
+    std::thread::sleep(Duration::from_millis(200));
+    let told = interrupted(render);
+    assert_eq!(told, "tyndall: interrupted before there was anything to write\n");
+    assert!(files_in_out(&folder).is_empty());
 }
 
 /// Ctrl-C again and again from the moment in which a picture begins to appear: it is there whole, or not at all. On a fast

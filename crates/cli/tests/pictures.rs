@@ -2,9 +2,7 @@
 
 mod support;
 
-use std::io::{BufRead, BufReader, Read};
-use std::process::{Command, Stdio};
-use support::{Ended, Folder};
+use support::{Ended, Folder, decode, files_in_out, json, run, written};
 use tyndall_formats::image::{Metadata, read_metadata};
 
 const KINDS: [&str; 4] = ["png", "jpg", "tif", "exr"];
@@ -22,17 +20,6 @@ fn with_scene(text: &str) -> Folder {
     folder
 }
 
-/// Runs what must go well; returns what it printed.
-fn run(folder: &Folder, arguments: &[&str]) -> Vec<u8> {
-    let Ended { status, stdout, stderr, .. } = folder.run(arguments);
-    assert_eq!((status, stderr.as_str()), (Some(0), ""), "{arguments:?}");
-    stdout
-}
-
-fn json(bytes: &[u8]) -> serde_json::Value {
-    serde_json::from_slice(bytes).unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(bytes)))
-}
-
 /// The statistics of a run with further options.
 fn statistics(folder: &Folder, options: &[&str]) -> serde_json::Value {
     json(&run(folder, &[&["render", "../scene.toml", "--stats", "-"], options].concat()))
@@ -42,27 +29,6 @@ fn statistics(folder: &Folder, options: &[&str]) -> serde_json::Value {
 fn brightness(folder: &Folder, options: &[&str]) -> f64 {
     let mean = &statistics(folder, options)["mean_radiance"];
     (0..3).map(|channel| mean[channel].as_f64().expect("a number")).sum()
-}
-
-/// Width, height, bytes per pixel and pixels of a PNG.
-fn decode(png: &[u8]) -> ([u32; 2], usize, Vec<u8>) {
-    let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().expect("a PNG");
-    let mut pixels = vec![0; reader.output_buffer_size().expect("a size")];
-    let info = reader.next_frame(&mut pixels).expect("pixels");
-    ([info.width, info.height], info.color_type.samples(), pixels)
-}
-
-/// A file that the program wrote.
-fn written(folder: &Folder, name: &str) -> Vec<u8> {
-    std::fs::read(folder.at("out").join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
-}
-
-fn files_in_out(folder: &Folder) -> Vec<String> {
-    let entries = std::fs::read_dir(folder.at("out")).expect("a folder");
-    let mut names: Vec<_> =
-        entries.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
-    names.sort();
-    names
 }
 
 #[test]
@@ -260,31 +226,6 @@ fn bare_volumes_of_odd_kinds_are_never_black() {
     }
 }
 
-/// What `info` tells of samples that are no numbers: how many, and that NaN and minus infinity count as the
-/// smallest value, infinity as the largest.
-#[test]
-fn samples_that_are_no_numbers_are_counted_and_read_as_an_end_of_the_range() {
-    let values = [f64::NAN, 2.0, f64::INFINITY, 3.0, f64::NEG_INFINITY, 4.0, 2.0, 3.5];
-    #[expect(clippy::cast_possible_truncation, reason = "short numbers")]
-    let single = values.map(|v| (v as f32).to_le_bytes()).concat();
-    let double = values.map(f64::to_le_bytes).concat();
-    for (kind, name, samples) in [("float", "f32", single), ("double", "f64", double)] {
-        let folder = Folder::new();
-        let head =
-            format!("NRRD0004\ntype: {kind}\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nendian: little\n\n");
-        folder.put("a.nrrd", [head.as_bytes(), &samples].concat());
-        let told = json(&run(&folder, &["info", "../a.nrrd", "--json"]));
-        assert_eq!(told["type"], name, "{told}");
-        assert_eq!(told["non_finite"], 3, "{told}");
-        assert_eq!(told["value_range"], serde_json::json!([2.0, 4.0]), "{told}");
-        let counts: Vec<u64> = serde_json::from_value(told["histogram"]["counts"].clone()).expect("numbers");
-        assert_eq!((counts[0], counts[255], counts.iter().sum::<u64>()), (4, 2, 8), "{told}");
-        let text = String::from_utf8(run(&folder, &["info", "../a.nrrd"])).expect("UTF-8");
-        assert!(text.contains("not finite 3 samples; NaN is read as the smallest value"), "{text}");
-        assert!(text.contains("values     2 to 4;"), "{text}");
-    }
-}
-
 #[test]
 fn the_brightest_light_still_has_a_mean_and_an_error() {
     let folder = with_scene(&format!("{SCENE}lights = [{{ type = 'environment', radiance = 1e18 }}]\n"));
@@ -320,38 +261,6 @@ fn a_hundred_thousand_lights_are_rendered() {
 }
 
 #[test]
-fn a_part_that_is_not_shown_is_noted() {
-    let folder = Folder::new();
-    let head = "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 2 2 2 3\nencoding: raw\n\n";
-    folder.put("a.nrrd", [head.as_bytes(), &[9; 24]].concat());
-    let arguments = ["render", "../a.nrrd", "--size", "8x8", "--samples", "1"];
-    let Ended { status, stderr, .. } = folder.run(&arguments);
-    assert_eq!(status, Some(0), "{stderr}");
-    assert_eq!(stderr, "tyndall: note: 3 time steps: the first was read\n");
-    run(&folder, &[&arguments[..], &["-q"]].concat());
-}
-
-#[test]
-fn a_picture_without_matter_is_noted() {
-    let folder = Folder::new();
-    folder.put("scene.toml", SCENE);
-    let clip =
-        |normal: &str| format!("clip=[{{\"type\":\"plane\",\"point\":[0,99,0],\"normal\":[0,{normal},0]}}]");
-    for (assignment, note) in [
-        (
-            "transfer_function.points=[{\"value\":1.5,\"opacity\":0},{\"value\":2,\"opacity\":1}]",
-            "no value of the data has any opacity",
-        ),
-        (&clip("-1"), "a clip cuts the whole volume away"),
-        (&clip("1"), ""),
-    ] {
-        let Ended { status, stderr, .. } = folder.run(&["render", "../scene.toml", "--set", assignment]);
-        assert_eq!(status, Some(0), "{stderr}");
-        assert!(stderr.contains(note) && stderr.is_empty() == note.is_empty(), "{assignment}: {stderr}");
-    }
-}
-
-#[test]
 fn every_stop_is_met() {
     let folder = with_scene(SCENE);
     for most in ["1e300", "1.8e19", "1e18"] {
@@ -366,76 +275,4 @@ fn every_stop_is_met() {
     assert_eq!(told["samples_per_pixel"], 4.0);
     let dark = ["--target-error", "0.1", "--set", "lights=[]", "--set", "film.background=0"];
     assert!(statistics(&folder, &dark)["relative_error"].is_null());
-}
-
-#[test]
-fn what_the_loader_understood_is_told() {
-    let folder = Folder::new();
-    let head = "NRRD0004\ntype: short\ndimension: 3\nsizes: 3 2 1\nspace: LPS\n\
-                space directions: (2,0,0) (0,3,0) (0,0,4)\nspace origin: (5,6,7)\nencoding: raw\nendian: little\n\n";
-    let samples = [-1000_i16, 0, 1, 2, 3, 500].map(i16::to_le_bytes).concat();
-    folder.put("a.nrrd", [head.as_bytes(), &samples].concat());
-    folder.put("scene.json", "{ \"volume\": { \"path\": \"a.nrrd\" }, \"film\": { \"size\": [8, 8] } }");
-    let told = json(&run(&folder, &["info", "../a.nrrd", "--json"]));
-    for (key, value) in [
-        ("dims", serde_json::json!([3, 2, 1])),
-        ("type", serde_json::json!("i16")),
-        ("spacing", serde_json::json!([2.0, 3.0, 4.0])),
-        ("direction", serde_json::json!([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])),
-        ("origin", serde_json::json!([5.0, 6.0, 7.0])),
-        ("bounds", serde_json::json!([[4.0, 4.5, 5.0], [10.0, 10.5, 9.0]])),
-        ("value_range", serde_json::json!([-1000.0, 500.0])),
-        ("channels", serde_json::json!(1)),
-        ("times", serde_json::json!(1)),
-    ] {
-        assert_eq!(told[key], value, "{key}");
-    }
-    assert_eq!(told["robust_range"].as_array().map(Vec::len), Some(2), "{told}");
-    assert_eq!(told["histogram"]["range"], told["value_range"]);
-    let counts = told["histogram"]["counts"].as_array().expect("counts");
-    assert_eq!(counts.iter().filter_map(serde_json::Value::as_u64).sum::<u64>(), 6);
-    assert_eq!(json(&run(&folder, &["info", "../scene.json", "--json"])), told);
-    run(&folder, &["render", "../scene.json", "-o", "a.exr", "--samples", "1"]);
-    assert_eq!(json(&run(&folder, &["info", "a.exr", "--json"])), told);
-    let text = String::from_utf8(run(&folder, &["info", "../a.nrrd"])).expect("UTF-8");
-    assert!(text.contains("3 x 2 x 1 of i16") && text.contains("-1000 to 500"), "{text}");
-}
-
-#[test]
-fn lists_are_printed() {
-    let folder = Folder::new();
-    let presets = String::from_utf8(run(&folder, &["presets"])).expect("UTF-8");
-    assert!(presets.lines().any(|line| line.starts_with("ct-bone ")), "{presets}");
-    let schema = json(&run(&folder, &["schema"]));
-    assert!(schema["properties"]["volume"].is_object(), "{schema}");
-    let script = String::from_utf8(run(&folder, &["completions", "bash"])).expect("UTF-8");
-    assert!(script.contains("_tyndall()") && script.contains("--max-scatter"), "{script}");
-}
-
-/// Ctrl-C in the middle of a render: what is there is written, and the status says so.
-#[cfg(unix)]
-#[test]
-fn an_interrupted_render_leaves_a_readable_picture() {
-    let folder = with_scene(SCENE);
-    let arguments = ["render", "../scene.toml", "--samples", "2000000000", "-v", "-o", "a.png"];
-    let mut child = folder.tyndall(&arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
-    let mut stderr = BufReader::new(child.stderr.take().expect("a pipe"));
-    let mut line = String::new();
-    stderr.read_line(&mut line).expect("a line");
-    assert!(line.starts_with("tyndall: loaded in "), "{line}");
-    // Long enough for a pass over all of 256 pixels.
-    std::thread::sleep(std::time::Duration::from_millis(500));
-    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
-    assert!(sent.success());
-    let status = child.wait().expect("a status");
-    let mut rest = String::new();
-    stderr.read_to_string(&mut rest).expect("text");
-    assert_eq!(status.code(), Some(130), "{rest}");
-    assert!(!rest.contains("panicked"), "{rest}");
-    assert_eq!(files_in_out(&folder), ["a.png"]);
-    let (size, _, pixels) = decode(&written(&folder, "a.png"));
-    assert!(size == [16, 16] && pixels.iter().any(|&x| x > 100), "{size:?}");
-    let metadata = read_metadata(&folder.at("out/a.png")).expect("a picture").expect("metadata");
-    let samples: u32 = metadata.get(Metadata::SAMPLES).expect("samples").parse().expect("a number");
-    assert!((1..2_000_000_000).contains(&samples), "{samples}");
 }

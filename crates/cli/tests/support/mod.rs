@@ -1,4 +1,5 @@
 //! Runs the built program in folders that vanish afterwards.
+#![allow(dead_code, reason = "each file of tests uses what it needs")]
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -82,4 +83,38 @@ fn peak_memory(process: u32) -> u64 {
     let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok()).unwrap_or(0) << 10
+}
+
+/// Runs what must go well; returns what it printed.
+pub fn run(folder: &Folder, arguments: &[&str]) -> Vec<u8> {
+    let Ended { status, stdout, stderr, .. } = folder.run(arguments);
+    assert_eq!((status, stderr.as_str()), (Some(0), ""), "{arguments:?}");
+    stdout
+}
+
+/// What was printed as JSON.
+pub fn json(bytes: &[u8]) -> serde_json::Value {
+    serde_json::from_slice(bytes).unwrap_or_else(|e| panic!("{e}: {}", String::from_utf8_lossy(bytes)))
+}
+
+/// Width, height, bytes per pixel and pixels of a PNG.
+pub fn decode(png: &[u8]) -> ([u32; 2], usize, Vec<u8>) {
+    let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().expect("a PNG");
+    let mut pixels = vec![0; reader.output_buffer_size().expect("a size")];
+    let info = reader.next_frame(&mut pixels).expect("pixels");
+    ([info.width, info.height], info.color_type.samples(), pixels)
+}
+
+/// A file that the program wrote.
+pub fn written(folder: &Folder, name: &str) -> Vec<u8> {
+    fs::read(folder.at("out").join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+/// The names in the folder in which the program ran, in order.
+pub fn files_in_out(folder: &Folder) -> Vec<String> {
+    let entries = fs::read_dir(folder.at("out")).expect("a folder");
+    let mut names: Vec<_> =
+        entries.map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
 }

@@ -106,6 +106,19 @@ mod tests {
     use crate::volume::{Volume, Voxels};
 
     #[test]
+    fn a_cell_of_one_value_holds_what_is_read_there() {
+        let mut random = tyndall_testing::SplitMix::new(2);
+        for _ in 0..2000 {
+            let values = ValueMap { slope: random.uniform() - 0.5, intercept: 1e3 * random.uniform() };
+            let stored = cast::round_u16(cast::single(60_000.0 * random.uniform()));
+            let grid = Grid::centred([3; 3], [1.0; 3]).unwrap();
+            let volume = Volume::new(grid, Voxels::U16(vec![stored; 27]), values).unwrap();
+            let value = volume.value(Vec3::ONE);
+            assert_eq!(volume.cells_of(0).ranges(), [[value; 2]], "{values:?} of {stored}");
+        }
+    }
+
+    #[test]
     fn no_point_of_a_cell_leaves_its_range() {
         let n = [19, 8, 11];
         let data: Vec<u16> = (0..u16::try_from(n.iter().product::<usize>()).unwrap())

@@ -1,22 +1,18 @@
-//! Light paths from every kind of light: their power into the box, and the fluence that they make inside it.
+//! Light paths from every kind of light: their power into the box, and where they enter it.
 
-use crate::scenes::{Setup, mean};
+use crate::scenes::mean;
 use std::f64::consts::PI;
 use std::sync::Arc;
-use tyndall::light::{
-    Directional, Disk, Emission, Enclosure, Environment, Light, LightSample, Map, PointLight, Rect,
-    SphereLight,
-};
+use tyndall::light::{Directional, Disk, Enclosure, Environment, Light, Map, PointLight, Rect, SphereLight};
 use tyndall::math::{Bounds, Ray, Rgb, Vec3};
-use tyndall::sampling::{Stream, warp};
-use tyndall::transfer::{Optics, Point};
-use tyndall::volume::{Grid, Interpolation, Space, ValueMap, Volume, Voxels};
-use tyndall_testing::{ChiSquare, Mean, ZTest};
+use tyndall::sampling::Stream;
+use tyndall::volume::{Grid, Space};
+use tyndall_testing::{ChiSquare, Mean};
 
 const UNIT: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// Unequal edges along the axes; turned; sheared and left-handed. All have the same middle.
-fn grids() -> [(&'static str, Grid); 3] {
+pub fn grids() -> [(&'static str, Grid); 3] {
     let (s, c) = 0.6_f64.sin_cos();
     let (p, q) = 0.9_f64.sin_cos();
     let turned = [[c, -s * q, s * p], [s, c * q, -c * p], [0.0, p, q]];
@@ -31,11 +27,11 @@ fn grids() -> [(&'static str, Grid); 3] {
     })
 }
 
+/// A sphere inside the box of every grid.
+pub const PROBE: (Vec3, f32) = (Vec3::new(0.3, 0.2, -0.1), 0.35);
+
 /// Middle of the grids.
 const MIDDLE: Vec3 = Vec3::splat(0.1);
-
-/// A sphere inside the box of every grid.
-const PROBE: (Vec3, f32) = (Vec3::new(0.3, 0.2, -0.1), 0.35);
 
 /// Area vectors of the three pairs of faces.
 fn normals(grid: &Grid) -> [Vec3; 3] {
@@ -55,7 +51,8 @@ fn hits(grid: &Grid, ray: &Ray) -> bool {
     !loose.intersect(&grid.ray_to_index(ray)).is_empty()
 }
 
-fn uniforms(stream: &mut Stream) -> [f32; 4] {
+/// What a path begins with.
+pub fn uniforms(stream: &mut Stream) -> [f32; 4] {
     std::array::from_fn(|_| stream.uniform())
 }
 
@@ -248,7 +245,8 @@ fn rays_enter_the_box_ahead() {
     }
 }
 
-fn lights() -> Vec<(&'static str, Light)> {
+/// Of each kind some, close, aside and inside, in one colour.
+pub fn lights() -> Vec<(&'static str, Light)> {
     let color = Rgb::new(0.7, 2.0, 0.3);
     let texels = |i: usize| {
         Rgb::new(0.1, if i.is_multiple_of(37) { 9.0 } else { 0.2 }, (i % 5) as f32 * 0.1 + (i / 256) as f32)
@@ -282,114 +280,6 @@ fn lights() -> Vec<(&'static str, Light)> {
         ("sky", Light::Environment(Environment::constant(color, true))),
         ("map", Light::Environment(Environment::map(map, Vec3::Z, 30.0, true))),
     ]
-}
-
-/// What a path of flux 1 adds to the mean fluence: its length inside the probe over the probe's volume.
-fn crossing(ray: &Ray) -> f64 {
-    let (center, radius) = PROBE;
-    let to_center = center - ray.origin;
-    let along = to_center.dot(ray.direction);
-    let aside = (to_center - ray.direction * along).length_squared();
-    let half_chord = (radius * radius - aside).max(0.0).sqrt();
-    let volume = 4.0 / 3.0 * PI * f64::from(radius).powi(3);
-    if along > 0.0 { response(ray.direction) * 2.0 * f64::from(half_chord) / volume } else { 0.0 }
-}
-
-/// How well the probe sees light that travels in a direction: better from some sides, so that a path turned round shows.
-fn response(travel: Vec3) -> f64 {
-    1.0 + f64::from(travel.dot(Vec3::new(0.6, -0.48, 0.64)))
-}
-
-fn place_in_the_probe(stream: &mut Stream) -> Vec3 {
-    let (center, radius) = PROBE;
-    let direction = warp::sphere([stream.uniform(), stream.uniform()]);
-    center + direction * (radius * stream.uniform().cbrt())
-}
-
-/// Mean fluence by light paths and by light samples: equal, both known to a percent.
-fn compare(name: &str, by_paths: Mean, by_samples: Mean) {
-    let variance = by_paths.variance_of_mean() + by_samples.variance_of_mean();
-    let test = ZTest::new(by_paths.mean(), variance, by_samples.mean());
-    assert!(test.is_within(4.0, 1e-2), "{name}: {test}");
-}
-
-/// Path by path the mean fluence over a small sphere is that which [`Light::sample`] finds at its points.
-#[test]
-fn paths_bring_the_fluence_that_samples_see() {
-    const PATHS: u32 = 1 << 20;
-    for (grid_name, grid) in grids() {
-        let box_ = Enclosure::new(&grid);
-        for (name, light) in lights() {
-            // Only a map has colours of its own.
-            for channel in if name == "map" { 0..3 } else { 1..2 } {
-                let of = |rgb: Rgb| f64::from(rgb.to_array()[channel]);
-                let by_paths = mean(7, PATHS, |_, stream| {
-                    let emitted = light.emit(&box_, uniforms(stream));
-                    emitted.map_or(0.0, |e| of(e.flux * light.color()) * crossing(&e.ray))
-                });
-                let seen = |s: LightSample| of(s.radiance) * response(-s.direction);
-                let by_samples = mean(8, PATHS, |_, stream| {
-                    let from = place_in_the_probe(stream);
-                    light.sample(from, [stream.uniform(), stream.uniform()]).map_or(0.0, seen)
-                });
-                compare(&format!("{grid_name}, {name}, channel {channel}"), by_paths, by_samples);
-            }
-        }
-    }
-}
-
-/// Glowing matter in the lower layers, vacuum above, where the probe is.
-fn glowing(grid: Grid, layers: usize) -> Setup {
-    let [nx, ny, _] = grid.dims();
-    let data = (0..grid.len()).map(|i| if i / (nx * ny) < layers { 1.0 } else { 0.0 }).collect();
-    let volume = Volume::new(grid, Voxels::F32(data), ValueMap::IDENTITY).unwrap();
-    let look = |optics: Optics, at: f32| [-0.4, 0.4].map(|d| Point { value: at + d, optics });
-    let albedo = Rgb::splat(0.3);
-    let glow = Optics { emission: Rgb::new(0.5, 3.0, 1.0), opacity: 0.4, albedo, ..Optics::default() };
-    let nothing = Optics { opacity: 0.0, ..Optics::default() };
-    let points = [look(nothing, 0.0), look(glow, 1.0)].concat();
-    Setup::new(volume.with_interpolation(Interpolation::Nearest), points, 2.0)
-}
-
-#[test]
-fn glowing_matter_sends_all_its_power() {
-    for (_, grid) in grids() {
-        for layers in [8, 2] {
-            let volume = f64::from(grid.voxel_size()).powi(3) * grid.len() as f64 * layers as f64 / 8.0;
-            let scene = glowing(grid.clone(), layers).scene();
-            let medium = &*scene.medium;
-            let emission = Emission::new(medium).unwrap();
-            let emitted = mean(5, 1 << 20, |_, stream| {
-                let u = uniforms(stream);
-                emission.emit(medium, u, stream).map_or(0.0, |e| f64::from(e.flux.g))
-            });
-            // To all sides: extinction 2 x 0.4, of which albedo leaves 0.7, and source radiance 3.
-            let expected = 4.0 * PI * 2.0 * 0.4 * 0.7 * 3.0 * volume;
-            emitted.against(expected).assert_within(3.5, 2e-3);
-        }
-    }
-}
-
-#[test]
-fn glowing_matter_brings_the_fluence_that_samples_see() {
-    for (name, grid) in grids() {
-        let scene = glowing(grid, 2).scene();
-        let medium = &*scene.medium;
-        let emission = Emission::new(medium).unwrap();
-        for channel in [0, 1] {
-            let of = |rgb: Rgb| f64::from(rgb.to_array()[channel]);
-            let by_paths = mean(7, 1 << 21, |_, stream| {
-                let u = uniforms(stream);
-                emission.emit(medium, u, stream).map_or(0.0, |e| of(e.flux) * crossing(&e.ray))
-            });
-            let by_samples = mean(8, 1 << 20, |_, stream| {
-                let from = place_in_the_probe(stream);
-                let sample = emission.sample(medium, from, stream);
-                sample.map_or(0.0, |s| of(s.radiance) * response(-s.direction))
-            });
-            compare(&format!("{name}, channel {channel}"), by_paths, by_samples);
-        }
-    }
 }
 
 /// The same kinds of lights in another colour, and each otherwise changed.

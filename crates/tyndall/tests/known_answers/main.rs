@@ -11,6 +11,7 @@
 mod coverage;
 mod emission;
 mod emit;
+mod fluence;
 mod furnace;
 mod levels;
 mod lights;

@@ -1,0 +1,128 @@
+//! What is told beside pictures: what the loader understood, notes, lists.
+
+mod support;
+
+use support::{Ended, Folder, json, run};
+
+/// A cloud in a few pixels.
+const SCENE: &str = "\
+    volume.procedural = { kind = 'cloud', size = [12, 12, 12] }\n\
+    medium.density = 0.5\n\
+    film.size = [16, 16]\n\
+    render.samples = 4\n";
+
+#[test]
+fn a_part_that_is_not_shown_is_noted() {
+    let folder = Folder::new();
+    let head = "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 2 2 2 3\nencoding: raw\n\n";
+    folder.put("a.nrrd", [head.as_bytes(), &[9; 24]].concat());
+    let arguments = ["render", "../a.nrrd", "--size", "8x8", "--samples", "1"];
+    let Ended { status, stderr, .. } = folder.run(&arguments);
+    assert_eq!(status, Some(0), "{stderr}");
+    assert_eq!(stderr, "tyndall: note: 3 time steps: the first was read\n");
+    run(&folder, &[&arguments[..], &["-q"]].concat());
+}
+
+#[test]
+fn a_picture_without_matter_is_noted() {
+    let folder = Folder::new();
+    folder.put("scene.toml", SCENE);
+    let clip =
+        |normal: &str| format!("clip=[{{\"type\":\"plane\",\"point\":[0,99,0],\"normal\":[0,{normal},0]}}]");
+    for (assignment, note) in [
+        (
+            "transfer_function.points=[{\"value\":1.5,\"opacity\":0},{\"value\":2,\"opacity\":1}]",
+            "no value of the data has any opacity",
+        ),
+        (&clip("-1"), "a clip cuts the whole volume away"),
+        (&clip("1"), ""),
+    ] {
+        let Ended { status, stderr, .. } = folder.run(&["render", "../scene.toml", "--set", assignment]);
+        assert_eq!(status, Some(0), "{stderr}");
+        assert!(stderr.contains(note) && stderr.is_empty() == note.is_empty(), "{assignment}: {stderr}");
+    }
+}
+
+/// No picture has holes: the first sample of every pixel is taken whatever time it takes, here some seconds for light paths.
+#[test]
+fn a_first_sample_past_the_time_is_noted() {
+    let folder = Folder::new();
+    folder.put("scene.toml", SCENE);
+    let arguments = ["render", "../scene.toml", "--time", "0.01"];
+    run(&folder, &arguments);
+    let dense = ["--threads", "1", "--set", "medium.density=50", "--set", "render.photon.photons=300000"];
+    let photon = [&arguments[..], &["--integrator", "photon"], &dense].concat();
+    let Ended { status, stderr, .. } = folder.run(&photon);
+    assert_eq!(status, Some(0), "{stderr}");
+    let note = "note: the first sample of every pixel";
+    assert!(stderr.contains(note) && stderr.lines().count() == 1, "{stderr}");
+}
+
+/// What `info` tells of samples that are no numbers: how many, and that NaN and minus infinity count as the
+/// smallest value, infinity as the largest.
+#[test]
+fn samples_that_are_no_numbers_are_counted_and_read_as_an_end_of_the_range() {
+    let values = [f64::NAN, 2.0, f64::INFINITY, 3.0, f64::NEG_INFINITY, 4.0, 2.0, 3.5];
+    #[expect(clippy::cast_possible_truncation, reason = "short numbers")]
+    let single = values.map(|v| (v as f32).to_le_bytes()).concat();
+    let double = values.map(f64::to_le_bytes).concat();
+    for (kind, name, samples) in [("float", "f32", single), ("double", "f64", double)] {
+        let folder = Folder::new();
+        let head =
+            format!("NRRD0004\ntype: {kind}\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nendian: little\n\n");
+        folder.put("a.nrrd", [head.as_bytes(), &samples].concat());
+        let told = json(&run(&folder, &["info", "../a.nrrd", "--json"]));
+        assert_eq!(told["type"], name, "{told}");
+        assert_eq!(told["non_finite"], 3, "{told}");
+        assert_eq!(told["value_range"], serde_json::json!([2.0, 4.0]), "{told}");
+        let counts: Vec<u64> = serde_json::from_value(told["histogram"]["counts"].clone()).expect("numbers");
+        assert_eq!((counts[0], counts[255], counts.iter().sum::<u64>()), (4, 2, 8), "{told}");
+        let text = String::from_utf8(run(&folder, &["info", "../a.nrrd"])).expect("UTF-8");
+        assert!(text.contains("not finite 3 samples; NaN is read as the smallest value"), "{text}");
+        assert!(text.contains("values     2 to 4;"), "{text}");
+    }
+}
+
+#[test]
+fn what_the_loader_understood_is_told() {
+    let folder = Folder::new();
+    let head = "NRRD0004\ntype: short\ndimension: 3\nsizes: 3 2 1\nspace: LPS\n\
+                space directions: (2,0,0) (0,3,0) (0,0,4)\nspace origin: (5,6,7)\nencoding: raw\nendian: little\n\n";
+    let samples = [-1000_i16, 0, 1, 2, 3, 500].map(i16::to_le_bytes).concat();
+    folder.put("a.nrrd", [head.as_bytes(), &samples].concat());
+    folder.put("scene.json", "{ \"volume\": { \"path\": \"a.nrrd\" }, \"film\": { \"size\": [8, 8] } }");
+    let told = json(&run(&folder, &["info", "../a.nrrd", "--json"]));
+    for (key, value) in [
+        ("dims", serde_json::json!([3, 2, 1])),
+        ("type", serde_json::json!("i16")),
+        ("spacing", serde_json::json!([2.0, 3.0, 4.0])),
+        ("direction", serde_json::json!([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])),
+        ("origin", serde_json::json!([5.0, 6.0, 7.0])),
+        ("bounds", serde_json::json!([[4.0, 4.5, 5.0], [10.0, 10.5, 9.0]])),
+        ("value_range", serde_json::json!([-1000.0, 500.0])),
+        ("channels", serde_json::json!(1)),
+        ("times", serde_json::json!(1)),
+    ] {
+        assert_eq!(told[key], value, "{key}");
+    }
+    assert_eq!(told["robust_range"].as_array().map(Vec::len), Some(2), "{told}");
+    assert_eq!(told["histogram"]["range"], told["value_range"]);
+    let counts = told["histogram"]["counts"].as_array().expect("counts");
+    assert_eq!(counts.iter().filter_map(serde_json::Value::as_u64).sum::<u64>(), 6);
+    assert_eq!(json(&run(&folder, &["info", "../scene.json", "--json"])), told);
+    run(&folder, &["render", "../scene.json", "-o", "a.exr", "--samples", "1"]);
+    assert_eq!(json(&run(&folder, &["info", "a.exr", "--json"])), told);
+    let text = String::from_utf8(run(&folder, &["info", "../a.nrrd"])).expect("UTF-8");
+    assert!(text.contains("3 x 2 x 1 of i16") && text.contains("-1000 to 500"), "{text}");
+}
+
+#[test]
+fn lists_are_printed() {
+    let folder = Folder::new();
+    let presets = String::from_utf8(run(&folder, &["presets"])).expect("UTF-8");
+    assert!(presets.lines().any(|line| line.starts_with("ct-bone ")), "{presets}");
+    let schema = json(&run(&folder, &["schema"]));
+    assert!(schema["properties"]["volume"].is_object(), "{schema}");
+    let script = String::from_utf8(run(&folder, &["completions", "bash"])).expect("UTF-8");
+    assert!(script.contains("_tyndall()") && script.contains("--max-scatter"), "{script}");
+}
