@@ -1,9 +1,10 @@
 //! The command line.
 
-use clap::builder::PossibleValuesParser;
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args as Group, Parser, Subcommand, ValueEnum, value_parser};
 use std::path::PathBuf;
 use std::time::Duration;
+use tyndall::integrator::METHODS;
 use tyndall::transfer::PRESETS;
 
 /// The scene document's own limits, so that a number past them is told as the option's fault.
@@ -137,8 +138,8 @@ pub struct ReplayOptions {
 #[derive(Debug, Group)]
 pub struct SceneOptions {
     /// Compute light by this method
-    #[arg(long, value_enum, value_name = "NAME", help_heading = "Scene")]
-    pub integrator: Option<Integrator>,
+    #[arg(long, value_name = "NAME", help_heading = "Scene", value_parser = methods())]
+    pub integrator: Option<String>,
 
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", value_parser = size, help_heading = "Scene")]
@@ -219,26 +220,9 @@ pub enum BenchName {
     All,
 }
 
-/// Methods by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Integrator {
-    /// Emission-absorption and single scattering: fast, flat, free of noise
-    Raymarch,
-    /// Unbiased Monte Carlo of all orders of scattering: the ground truth
-    Path,
-    /// Photon mapping that survives edits: redoes the light alone that an edit touched
-    Photon,
-}
-
-impl Integrator {
-    /// The name in the scene document.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Raymarch => "raymarch",
-            Self::Path => "path",
-            Self::Photon => "photon",
-        }
-    }
+/// The methods, as the library lists them.
+fn methods() -> PossibleValuesParser {
+    METHODS.iter().map(|method| PossibleValue::new(method.name).help(method.about)).collect::<Vec<_>>().into()
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {
@@ -264,7 +248,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
 mod tests {
     use super::*;
     use clap::CommandFactory;
-    use tyndall::scene::document;
+    use tyndall_live::document;
 
     #[test]
     fn the_command_line_is_consistent() {

@@ -1,11 +1,11 @@
 //! Edits files: a JSON list of named merge patches.
 
 use crate::Failure;
-use crate::input::read_text;
 use serde_json::Value;
 use std::path::Path;
 use tyndall::message::{excerpt, place, quoted};
-use tyndall::scene::document::{self, DocumentError};
+use tyndall_live::document::{self, DocumentError};
+use tyndall_live::read_text;
 
 /// One edit.
 pub struct Edit {
@@ -20,13 +20,14 @@ pub struct Edit {
 /// The edits of a file, not yet looked at one by one, so that those before a bad one are still played.
 pub fn read(path: &Path) -> Result<Vec<Value>, Failure> {
     let what = "a list of edits";
-    let value = document::value_from_json(&read_text(path, what)?).map_err(|e| match e {
-        DocumentError::Syntax { line, column, message, .. } => Failure::input(format!(
-            "{}: line {line}, column {column}: {message}; expected {what} in JSON",
-            place(path)
-        )),
-        other => Failure::input(format!("{}: {other}", place(path))),
-    })?;
+    let value =
+        document::value_from_json(&read_text(path, what).map_err(Failure::input)?).map_err(|e| match e {
+            DocumentError::Syntax { line, column, message, .. } => Failure::input(format!(
+                "{}: line {line}, column {column}: {message}; expected {what} in JSON",
+                place(path)
+            )),
+            other => Failure::input(format!("{}: {other}", place(path))),
+        })?;
     match value {
         Value::Array(edits) => Ok(edits),
         other => Err(Failure::input(format!(

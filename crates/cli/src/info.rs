@@ -1,31 +1,35 @@
 //! `tyndall info`: what the loader understood.
 
 use crate::args::InfoOptions;
-use crate::input::Input;
+use crate::machine::{pool, vector_instructions};
 use crate::{Failure, say};
 use serde_json::json;
 use std::fmt::Write;
 use tyndall::math::Vec3;
 use tyndall::message::sentence;
-use tyndall::scene::document::FieldKind;
 use tyndall::transfer::Preset;
 use tyndall::volume::procedural::MATERIALS;
 use tyndall::volume::{Space, Volume};
-use tyndall_formats::assets::Source;
+use tyndall_live::document::FieldKind;
+use tyndall_live::{Input, Loaded, Options, Source};
 
 /// Bins of the histogram.
 const BINS: usize = 256;
 
 /// Prints what is known of a volume.
 pub fn run(options: &InfoOptions) -> Result<(), Failure> {
-    let mut input = Input::open(&options.file)?;
-    let (document, assets, source) = input.load(&options.file)?;
-    let volume = &*assets.volume;
-    if options.json {
-        return say(&format!("{:#}\n", as_json(volume, &source)));
+    let on = Options { threads: pool(None)?, level: vector_instructions()?, edits: false };
+    let loaded = Input::open(&options.file).and_then(|input| input.load(&on)).map_err(Failure::input)?;
+    on.threads.install(|| tell(&loaded, options.json))
+}
+
+fn tell(loaded: &Loaded, as_json: bool) -> Result<(), Failure> {
+    let (volume, source) = (&*loaded.assets.volume, &loaded.source);
+    if as_json {
+        return say(&format!("{:#}\n", to_json(volume, source)));
     }
-    let mut text = as_text(volume, &source);
-    if document.volume.procedural.is_some_and(|p| p.kind == FieldKind::CornellBox) {
+    let mut text = as_text(volume, source);
+    if loaded.document.volume.procedural.as_ref().is_some_and(|p| p.kind == FieldKind::CornellBox) {
         text.push_str("materials\n");
         for material in MATERIALS {
             // Writing to a string cannot fail.
@@ -35,7 +39,7 @@ pub fn run(options: &InfoOptions) -> Result<(), Failure> {
     say(&text)
 }
 
-fn as_json(volume: &Volume, source: &Source) -> serde_json::Value {
+fn to_json(volume: &Volume, source: &Source) -> serde_json::Value {
     let grid = volume.grid();
     let histogram = volume.histogram(volume.value_range(), BINS);
     json!({

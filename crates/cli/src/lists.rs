@@ -1,8 +1,8 @@
 //! `tyndall presets` and `tyndall schema`.
 
 use crate::{Failure, say};
-use tyndall::scene::document;
 use tyndall::transfer::{PRESETS, Preset};
+use tyndall_live::document;
 
 /// One preset a line.
 pub fn presets() -> Result<(), Failure> {

@@ -3,10 +3,6 @@
 use crate::Failure;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use tyndall::film::Film;
-use tyndall::integrator::PhotonMapping;
-use tyndall::scene::document::Document;
-use tyndall::scene::{IntegratorKind, RenderSettings};
 use tyndall::simd::Level;
 
 /// The widest vector instructions, or those that `TYNDALL_SIMD` names.
@@ -64,46 +60,5 @@ impl Interrupt {
     /// The flag itself, for sessions to look at.
     pub fn flag(&self) -> Arc<AtomicBool> {
         self.asked.clone()
-    }
-}
-
-/// Refuses a film for which there is no memory; `at` says what asks for it.
-pub fn check_film(size: [u32; 2], at: &str) -> Result<(), Failure> {
-    // The film, the picture with its layers, and the encoder's copy of it.
-    let needed = 3 * Film::bytes(size);
-    match tyndall_formats::memory::available() {
-        Some(available) if needed > available => Err(Failure::input(format!(
-            "{at}: film.size: {} x {} pixels need {} MiB, but {} MiB are free; expected a smaller picture",
-            size[0],
-            size[1],
-            needed >> 20,
-            available >> 20
-        ))),
-        _ => Ok(()),
-    }
-}
-
-/// Bytes in which a session may keep samples: those asked for, as far as that leaves room for much else.
-pub fn sample_memory(document: &Document) -> usize {
-    let asked = u64::from(document.render.path.history_memory) << 20;
-    let free = tyndall_formats::memory::available().map_or(asked, |available| available / 8);
-    usize::try_from(asked.min(free)).unwrap_or(usize::MAX)
-}
-
-/// Refuses photons for which there is no memory; `at` says what asks for them.
-pub fn check_photons(render: &RenderSettings, size: [u32; 2], at: &str) -> Result<(), Failure> {
-    let IntegratorKind::Photon(settings) = render.integrator else { return Ok(()) };
-    let needed = PhotonMapping::most_bytes(&settings, render.max_scatter, size);
-    match tyndall_formats::memory::available() {
-        Some(available) if needed > available => Err(Failure::input(format!(
-            "{at}: render.photon.photons: {} light paths of up to {} scatterings and {} segments a pixel may need {} MiB, but {} MiB \
-             are free; expected fewer of them",
-            settings.photons,
-            render.max_scatter,
-            settings.segments,
-            needed >> 20,
-            available >> 20
-        ))),
-        _ => Ok(()),
     }
 }

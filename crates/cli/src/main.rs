@@ -5,10 +5,11 @@ mod bench;
 mod edits;
 mod failure;
 mod info;
-mod input;
+
 mod lists;
 mod machine;
 mod output;
+mod overrides;
 mod progress;
 mod render;
 mod replay;

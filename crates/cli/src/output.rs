@@ -6,8 +6,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use tyndall::film::tone::ToneCurve;
 use tyndall::film::{Film, Image};
-use tyndall::scene::document::{Background, Document, Light, Tone};
 use tyndall_formats::image::{Display, Metadata, Picture, encode_png, write};
+use tyndall_live::document::{Background, Document, Light, Tone};
 
 /// The name of standard output.
 const STDOUT: &str = "-";

@@ -1,20 +1,17 @@
 //! `tyndall render`.
 
-use crate::Failure;
 use crate::args::RenderOptions;
-use crate::input::Input;
-use crate::machine::{Interrupt, check_film, check_photons, pool, vector_instructions};
-use crate::output;
+use crate::machine::{Interrupt, pool, vector_instructions};
 use crate::progress::Display;
 use crate::stats::{Stages, peak_memory};
+use crate::{Failure, output, overrides};
 use serde_json::json;
 use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use tyndall::message::{place, sentence};
-use tyndall::scene::Scene;
-use tyndall::session::{Budget, Session};
+use tyndall::message::sentence;
+use tyndall_live::{Budget, Input, LiveSession, Options};
 
 /// How often progress is looked at.
 const SLICE: Duration = Duration::from_millis(100);
@@ -43,25 +40,20 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let interrupt = Interrupt::listen();
     let threads = pool(options.run.threads)?;
     let level = vector_instructions()?;
-    let mut input = Input::open(&options.input)?;
+    let mut input = Input::open(&options.input).map_err(Failure::input)?;
     let places = output::places(&options.outputs, &options.input);
     output::check(&places, options.run.stats.as_deref())?;
 
-    input.override_with(&options.scene, options.samples)?;
-    let (document, assets, source) = threads.install(|| input.load(&options.input))?;
+    overrides::lay_over(&mut input, &options.scene, options.samples)?;
+    let on = Options { threads: threads.clone(), level, edits: false };
+    let loaded = input.load(&on).map_err(Failure::input)?;
     let load_s = stages.end("load");
-    let at = place(&options.input);
-    check_film(document.film.size, &at)?;
-    let scene = threads
-        .install(|| Scene::build(&document, &assets))
-        .map_err(|e| Failure::input(format!("{at}: {e}")))?;
-    check_photons(&scene.render, scene.size, &at)?;
+    let mut live = LiveSession::of(loaded, on).map_err(Failure::input)?;
     if !options.run.quiet {
-        for text in source.notes.iter().map(String::as_str).chain(scene.notes()) {
+        for text in live.notes() {
             drop(writeln!(std::io::stderr(), "tyndall: note: {}", sentence(text)));
         }
     }
-    let mut session = Session::with_level(scene, threads.clone(), level);
     let prepared = stages.end("prepare");
     note(&format!(
         "loaded in {load_s:.2} s, prepared in {prepared:.2} s, {} threads, {}",
@@ -69,26 +61,27 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         level.name()
     ));
 
+    let samples = live.document().render.samples;
     let limited = options.time.is_some() || options.target_error.is_some();
     let stop = Stop {
-        samples: if limited && options.samples.is_none() { u32::MAX } else { document.render.samples },
+        samples: if limited && options.samples.is_none() { u32::MAX } else { samples },
         time: options.time,
         error: options.target_error,
         // An error takes two samples to be told.
-        usual_samples: document.render.samples.max(2),
+        usual_samples: samples.max(2),
     };
     interrupt.ask_from_now_on();
     let display = Display::new(options.progress, options.run.quiet);
-    refine(&mut session, &stop, &interrupt.flag(), display);
+    refine(&mut live, &stop, &interrupt.flag(), display);
     let rendered = stages.end("render");
     let interrupted = interrupt.asked();
-    if interrupted && session.film().mean_samples() == 0.0 {
+    if interrupted && live.film().mean_samples() == 0.0 {
         if !options.run.quiet {
             drop(writeln!(std::io::stderr(), "tyndall: interrupted before there was anything to write"));
         }
         return Err(Failure::Interrupted);
     }
-    let late = |time: &Duration| session.film().samples() == 1 && rendered > 2.0 * time.as_secs_f64() + 0.5;
+    let late = |time: &Duration| live.film().samples() == 1 && rendered > 2.0 * time.as_secs_f64() + 0.5;
     if let Some(time) = stop.time.filter(late).filter(|_| !options.run.quiet) {
         let why = "the first sample of every pixel, without which a picture has holes,";
         let asked = time.as_secs_f64();
@@ -97,25 +90,25 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
             "tyndall: note: {why} took {rendered:.1} s of the {asked} s asked for"
         ));
     }
-    note(&format!("{:.2} samples per pixel in {rendered:.2} s", session.film().mean_samples()));
+    note(&format!("{:.2} samples per pixel in {rendered:.2} s", live.film().mean_samples()));
 
-    output::pictures(&places, session.film(), &document, &input.folder)?;
+    output::pictures(&places, live.film(), live.document(), live.folder())?;
     stages.end("write");
     if let Some(place) = &options.run.stats {
-        let film = session.film();
+        let film = live.film();
         let statistics = json!({
-            "integrator": session.scene().render.integrator.name(),
+            "integrator": live.scene().render.method.name(),
             "size": film.size(),
             "samples_per_pixel": film.mean_samples(),
             "wall_s": started.elapsed().as_secs_f64(),
             "load_s": load_s,
             "stages": stages.to_value(),
             "mean_radiance": film.mean_radiance(),
-            "relative_error": session.relative_error(),
+            "relative_error": live.session().relative_error(),
             "peak_memory_bytes": peak_memory(),
             "threads": threads.current_num_threads(),
             "simd": level.name(),
-            "seed": document.render.seed,
+            "seed": live.scene().render.seed,
         });
         output::statistics(place, &statistics)?;
     }
@@ -123,7 +116,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
 }
 
 /// Refines slice by slice until a stop is met, showing how far it is.
-fn refine(session: &mut Session, stop: &Stop, cancel: &Arc<AtomicBool>, mut display: Display) {
+fn refine(live: &mut LiveSession, stop: &Stop, cancel: &Arc<AtomicBool>, mut display: Display) {
     let begun = Instant::now();
     // A time that the clock cannot count to never comes.
     let end = stop.time.and_then(|time| begun.checked_add(time));
@@ -132,21 +125,21 @@ fn refine(session: &mut Session, stop: &Stop, cancel: &Arc<AtomicBool>, mut disp
     loop {
         let slice = Instant::now() + SLICE;
         // The first sample of every pixel is always taken: no picture has holes.
-        let complete = session.film().samples() > 0;
+        let complete = live.film().samples() > 0;
         let deadline = if complete { end.map_or(slice, |end| end.min(slice)) } else { slice };
         // Whether the picture has an error at all shows by then.
         let untold = stop.error.is_some() && error.is_none();
         let samples = if untold { stop.samples.min(stop.usual_samples) } else { stop.samples };
         let budget = Budget { samples, deadline: Some(deadline), cancel: cancel.clone() };
-        session.refine(&budget);
+        live.refine(&budget);
 
-        let film = session.film();
+        let film = live.film();
         let seconds = begun.elapsed().as_secs_f64();
         let samples_done = film.samples() >= stop.samples;
         let all_taken = film.samples() >= samples;
         if looked.elapsed() >= ERROR_EVERY || all_taken || begun.elapsed() < ERROR_EVERY {
             looked = Instant::now();
-            error = session.relative_error();
+            error = live.session().relative_error();
         }
         let time_is_up = film.samples() > 0 && end.is_some_and(|end| Instant::now() >= end);
         let good_enough = stop.error.is_some_and(|target| match error {

@@ -2,41 +2,40 @@
 
 use crate::args::ReplayOptions;
 use crate::edits::{self, Edit};
-use crate::input::Input;
-use crate::machine::{Interrupt, check_film, check_photons, pool, sample_memory, vector_instructions};
-use crate::{Failure, output, say};
+use crate::machine::{Interrupt, pool, vector_instructions};
+use crate::{Failure, output, overrides, say};
 use serde_json::{Map, Value, json};
 use std::io::Write;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
 use tyndall::film::Image;
-use tyndall::integrator::Kept;
+use tyndall::integrator::{KeptItems, WorkShare};
 use tyndall::message::{excerpt, place, sentence};
-use tyndall::scene::document::{self, Document};
-use tyndall::scene::{Assets, Scene};
-use tyndall::session::{Budget, Session};
-use tyndall::simd::Level;
-use tyndall_formats::assets;
+use tyndall_live::{Budget, Input, LiveSession, Options};
 
 /// Plays EDITS against SCENE.
 pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
     let interrupt = Interrupt::listen();
     let threads = pool(options.run.threads)?;
     let level = vector_instructions()?;
-    let mut input = Input::open(&options.input)?;
+    let mut input = Input::open(&options.input).map_err(Failure::input)?;
     output::check(&options.outputs, options.run.stats.as_deref())?;
     let edits = edits::read(&options.edits)?;
 
-    input.override_with(&options.scene, options.samples)?;
-    let mut live = Live::open(input, &options.input, threads, level, &interrupt)?;
+    overrides::lay_over(&mut input, &options.scene, options.samples)?;
+    let on = Options { threads: threads.clone(), level, edits: true };
+    let mut live = LiveSession::start(input, on).map_err(Failure::input)?;
     interrupt.ask_from_now_on();
+    let run = Run { verify: options.verify, interrupt: &interrupt };
     let begun = Instant::now();
-    live.refine(1);
+    run.refine(&mut live, 1);
     let first_s = begun.elapsed().as_secs_f64();
-    if !options.run.quiet {
-        live.notes();
-    }
+    let note = |text: &str| {
+        if !options.run.quiet {
+            drop(writeln!(std::io::stderr(), "tyndall: note: {}", sentence(text)));
+        }
+    };
+    live.notes().iter().for_each(|text| note(text));
 
     let mut reports = Vec::new();
     let told_on_stdout = options.run.stats.as_deref() == Some(Path::new("-"));
@@ -50,13 +49,14 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
             .map_err(|e| Failure::input(format!("{}: {e}", place(&options.edits))))
             .and_then(|edit| {
                 let at = format!("{}: {}", place(&options.edits), edit.at);
-                live.play(&edit, &at, options.verify).map(|report| (edit.name, report))
+                play(&mut live, &edit, &at, &run).map(|report| (edit.name, report))
             });
         match report {
             Ok((name, report)) => {
                 if show {
                     say(&report.line(&name))?;
                 }
+                report.notes.iter().for_each(|text| note(text));
                 report.warn(&name);
                 reports.push(report.to_value(&name));
             }
@@ -69,38 +69,24 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
 
     if let Some(place) = &options.run.stats {
         let statistics = json!({
-            "integrator": live.session.scene().render.integrator.name(),
-            "size": live.session.film().size(),
-            "threads": live.session.threads(),
+            "integrator": live.scene().render.method.name(),
+            "size": live.film().size(),
+            "threads": threads.current_num_threads(),
             "simd": level.name(),
-            "seed": live.document.render.seed,
+            "seed": live.scene().render.seed,
             "first_s": first_s,
             "edits": reports,
         });
         output::statistics(place, &statistics)?;
     }
     // Also before a bad edit: nothing is lost.
-    if !options.outputs.is_empty() && live.session.film().samples() > 0 {
-        live.refine(live.document.render.samples);
-        output::pictures(&options.outputs, live.session.film(), &live.document, &live.input.folder)?;
+    if !options.outputs.is_empty() && live.film().samples() > 0 {
+        let samples = live.document().render.samples;
+        run.refine(&mut live, samples);
+        output::pictures(&options.outputs, live.film(), live.document(), live.folder())?;
     }
     played?;
     if interrupt.asked() { Err(Failure::Interrupted) } else { Ok(()) }
-}
-
-/// A scene under edit.
-struct Live<'a> {
-    /// Where the document comes from.
-    input: Input,
-    /// The document as it was typed, with all edits so far.
-    value: Value,
-    document: Document,
-    assets: Assets,
-    session: Session,
-    pool: Arc<rayon::ThreadPool>,
-    level: Level,
-    interrupt: &'a Interrupt,
-    told: Vec<String>,
 }
 
 /// What one edit cost, and what it came to.
@@ -109,15 +95,17 @@ struct Report {
     integrator: &'static str,
     size: [u32; 2],
     latency_s: f64,
-    recomputed: Vec<(&'static str, f64)>,
+    recomputed: Vec<WorkShare>,
     check: Option<Check>,
+    /// What a user should know that was not so before.
+    notes: Vec<String>,
 }
 
 /// What there was before an edit.
 struct Before {
     samples: u32,
     image: Image,
-    kept: Option<Kept>,
+    kept: Option<Box<dyn KeptItems>>,
 }
 
 /// A live picture held against one from nothing.
@@ -136,132 +124,77 @@ impl Check {
     }
 }
 
-impl<'a> Live<'a> {
-    fn open(
-        mut input: Input,
-        path: &Path,
-        pool: Arc<rayon::ThreadPool>,
-        level: Level,
-        interrupt: &'a Interrupt,
-    ) -> Result<Self, Failure> {
-        let mut value = input.value.clone();
-        let (document, assets, source) = pool.install(|| input.load(path))?;
-        if input.bare && value.is_object() {
-            // Chosen by the volume, and no edit's to lose.
-            value = document::apply(&json!({ "medium": { "density": document.medium.density } }), &value);
-        }
-        let at = place(path);
-        check_film(document.film.size, &at)?;
-        let scene = build(&pool, &document, &assets, &at)?;
-        let mut session = Session::with_level(scene, pool.clone(), level);
-        session.keep_samples(sample_memory(&document));
-        Ok(Self { input, value, document, assets, session, pool, level, interrupt, told: source.notes })
+/// Applies an edit, and renders until every pixel has a sample of the new scene; `at` says which edit it is.
+fn play(live: &mut LiveSession, edit: &Edit, at: &str, run: &Run) -> Result<Report, Failure> {
+    let before = run.verify.then(|| {
+        let samples = live.document().render.samples;
+        run.refine(live, samples);
+        Before { samples: live.film().samples(), image: live.image(), kept: live.session().kept_items() }
+    });
+    let begun = Instant::now();
+    let notes = live.edit_at(&edit.patch, at).map_err(Failure::input)?.notes;
+    run.refine(live, 1);
+    let latency_s = begun.elapsed().as_secs_f64();
+    if run.interrupt.asked() {
+        return Err(Failure::Interrupted);
     }
+    let recomputed = live.session().recomputed();
+    let check = before.map(|before| check(live, &recomputed, &before, run)).transpose()?;
+    let (integrator, size) = (live.scene().render.method.name(), live.film().size());
+    Ok(Report { integrator, size, latency_s, recomputed, check, notes })
+}
 
-    /// Tells once what the user should know.
-    fn notes(&mut self) {
-        let of_scene = self.session.scene().notes().into_iter().map(str::to_owned);
-        for text in self.told.drain(..).chain(of_scene) {
-            drop(writeln!(std::io::stderr(), "tyndall: note: {}", sentence(&text)));
-        }
+/// Renders the edited scene from nothing, and compares.
+fn check(
+    live: &mut LiveSession,
+    recomputed: &[WorkShare],
+    before: &Before,
+    run: &Run,
+) -> Result<Check, Failure> {
+    let begun = Instant::now();
+    let mut fresh = live.fresh().map_err(Failure::input)?;
+    run.refine(&mut fresh, 1);
+    let scratch_s = begun.elapsed().as_secs_f64();
+
+    // Pictures are equal at equal numbers of samples, of which a kept one may have more than were asked for.
+    let samples = live.document().render.samples.max(live.film().samples());
+    run.refine(live, samples);
+    run.refine(&mut fresh, samples);
+    if run.interrupt.asked() {
+        return Err(Failure::Interrupted);
     }
-
-    fn refine(&mut self, samples: u32) {
-        refine(&mut self.session, samples, self.interrupt);
-    }
-
-    /// Applies an edit, and renders until every pixel has a sample of the new scene; `at` says which edit it is.
-    fn play(&mut self, edit: &Edit, at: &str, verify: bool) -> Result<Report, Failure> {
-        let before = verify.then(|| {
-            self.refine(self.document.render.samples);
-            Before {
-                samples: self.session.film().samples(),
-                image: self.session.image(),
-                kept: self.session.snapshot(),
-            }
-        });
-
-        let begun = Instant::now();
-        let value = document::apply(&self.value, &edit.patch);
-        let (document, assets) = self.parse(&value, at)?;
-        check_film(document.film.size, at)?;
-        let scene = build(&self.pool, &document, &assets, at)?;
-        if document.render.path != self.document.render.path {
-            self.session.keep_samples(sample_memory(&document));
-        }
-        self.session.set_scene(scene);
-        self.refine(1);
-        let latency_s = begun.elapsed().as_secs_f64();
-        (self.value, self.document, self.assets) = (value, document, assets);
-        if self.interrupt.asked() {
-            return Err(Failure::Interrupted);
-        }
-        let recomputed = self.session.recomputed().to_vec();
-        let check = before.map(|before| self.check(at, &recomputed, &before)).transpose()?;
-        let (integrator, size) = (self.session.scene().render.integrator.name(), self.document.film.size);
-        Ok(Report { integrator, size, latency_s, recomputed, check })
-    }
-
-    /// The document of an edited value, through the parser, with what it names.
-    fn parse(&self, value: &Value, at: &str) -> Result<(Document, Assets), Failure> {
-        let document =
-            Document::from_value(value.clone()).map_err(|e| Failure::input(format!("{at}: {e}")))?;
-        let assets = self
-            .pool
-            .install(|| assets::reload(&document, &self.input.folder, (&self.document, &self.assets)))
-            .map_err(|e| Failure::input(format!("{at}: {e}")))?;
-        Ok((document, assets))
-    }
-
-    /// Renders the edited scene from nothing, and compares.
-    fn check(
-        &mut self,
-        at: &str,
-        recomputed: &[(&'static str, f64)],
-        before: &Before,
-    ) -> Result<Check, Failure> {
-        let begun = Instant::now();
-        let (document, assets) = self.parse(&self.value, at)?;
-        let scene = build(&self.pool, &document, &assets, at)?;
-        let mut fresh = Session::with_level(scene, self.pool.clone(), self.level);
-        fresh.keep_samples(sample_memory(&document));
-        refine(&mut fresh, 1, self.interrupt);
-        let scratch_s = begun.elapsed().as_secs_f64();
-
-        // Pictures are equal at equal numbers of samples, of which a kept one may have more than were asked for.
-        let samples = document.render.samples.max(self.session.film().samples());
-        self.refine(samples);
-        refine(&mut fresh, samples, self.interrupt);
-        if self.interrupt.asked() {
-            return Err(Failure::Interrupted);
-        }
-        let of_items = self.session.snapshot().zip(self.session.computed()).zip(fresh.snapshot());
-        let (live, fresh) = (self.session.image(), fresh.image());
-        let differing = live.rgba.iter().zip(&fresh.rgba).filter(|(a, b)| a != b).count();
-        let same_size = before.image.size == live.size;
-        let (false_negatives, false_positives) = if let Some(((kept, computed), of_fresh)) = of_items {
-            let positives = |before| computed.saturating_sub(kept.changed_since(before));
-            (kept.differing(&of_fresh), before.kept.as_ref().filter(|_| same_size).map(positives))
-        } else {
-            let redone = recomputed.iter().any(|(_, share)| *share > 0.0);
-            let same_as_before = || before.image.rgba.iter().zip(&live.rgba).filter(|(a, b)| a == b).count();
-            let comparable = same_size && before.samples == samples;
-            let positives = if redone { comparable.then(same_as_before) } else { Some(0) };
-            (if redone { 0 } else { differing }, positives)
+    let computed = live.report().items_computed;
+    let of_items = live.session().kept_items().zip(computed).zip(fresh.session().kept_items());
+    let (live, fresh) = (live.image(), fresh.image());
+    let differing = live.rgba.iter().zip(&fresh.rgba).filter(|(a, b)| a != b).count();
+    let same_size = before.image.size == live.size;
+    let (false_negatives, false_positives) = if let Some(((kept, computed), of_fresh)) = of_items {
+        let positives = |before: &dyn KeptItems| {
+            let changes = kept.compare(before);
+            computed.saturating_sub(changes.differing + changes.new)
         };
-        Ok(Check { scratch_s, max_abs_diff: farthest(&live, &fresh), false_negatives, false_positives })
+        let before = before.kept.as_deref().filter(|_| same_size);
+        (kept.compare(&*of_fresh).differing, before.map(positives))
+    } else {
+        let redone = recomputed.iter().any(|work| work.share > 0.0);
+        let same_as_before = || before.image.rgba.iter().zip(&live.rgba).filter(|(a, b)| a == b).count();
+        let comparable = same_size && before.samples == samples;
+        let positives = if redone { comparable.then(same_as_before) } else { Some(0) };
+        (if redone { 0 } else { differing }, positives)
+    };
+    Ok(Check { scratch_s, max_abs_diff: farthest(&live, &fresh), false_negatives, false_positives })
+}
+
+/// How edits are played.
+struct Run<'a> {
+    verify: bool,
+    interrupt: &'a Interrupt,
+}
+
+impl Run<'_> {
+    fn refine(&self, live: &mut LiveSession, samples: u32) {
+        live.refine(&Budget { cancel: self.interrupt.flag(), ..Budget::samples(samples) });
     }
-}
-
-fn refine(session: &mut Session, samples: u32, interrupt: &Interrupt) {
-    session.refine(&Budget { cancel: interrupt.flag(), ..Budget::samples(samples) });
-}
-
-fn build(pool: &rayon::ThreadPool, document: &Document, assets: &Assets, at: &str) -> Result<Scene, Failure> {
-    let scene =
-        pool.install(|| Scene::build(document, assets)).map_err(|e| Failure::input(format!("{at}: {e}")))?;
-    check_photons(&scene.render, scene.size, at)?;
-    Ok(scene)
 }
 
 /// The largest difference of two pictures of one size, over all channels.
@@ -279,7 +212,7 @@ fn heading(verify: bool) -> String {
 impl Report {
     fn line(&self, name: &str) -> String {
         let shares: Vec<_> =
-            self.recomputed.iter().map(|(name, share)| format!("{:.1} % {name}", share * 100.0)).collect();
+            self.recomputed.iter().map(|work| format!("{:.1} % {}", work.share * 100.0, work.name)).collect();
         let name = excerpt(name);
         let mut line = format!("{name:<32} {:>8.1} ms  {}", self.latency_s * 1e3, shares.join(", "));
         if let Some(check) = &self.check {
@@ -312,7 +245,7 @@ impl Report {
 
     fn to_value(&self, name: &str) -> Value {
         let shares: Map<_, _> =
-            self.recomputed.iter().map(|&(name, share)| (name.into(), json!(share))).collect();
+            self.recomputed.iter().map(|work| (work.name.into(), json!(work.share))).collect();
         let mut value = json!({
             "name": name,
             "integrator": self.integrator,

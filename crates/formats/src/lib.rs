@@ -1,6 +1,5 @@
 //! Reads volumes and maps, writes pictures.
 
-pub mod assets;
 pub mod atomic;
 pub mod image;
 pub mod memory;

@@ -1,10 +1,11 @@
 //! A session: a scene, its integrator and the film, refined slice by slice.
 
 use crate::film::{Film, Image};
-use crate::integrator::{Integrator, Kept, Stop, TileState};
-use crate::scene::{Difference, IntegratorKind, Scene};
+use crate::integrator::{
+    Edited, Engine, KeptItems, Limits, MethodReport, PixelCounts, Resources, WorkShare, method_of,
+};
+use crate::scene::{Difference, Scene};
 use crate::simd::Level;
-use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -37,21 +38,33 @@ pub struct Progress {
     pub mean_samples: f64,
 }
 
+/// Seconds that a stage of the work took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StageTime {
+    /// Which stage.
+    pub name: &'static str,
+    /// How long.
+    pub seconds: f64,
+}
+
+/// Time spent since the last edit.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spent {
+    /// On what samples need beforehand.
+    preparing: Duration,
+    sampling: Duration,
+}
+
 /// Renders a scene on threads of its own.
 pub struct Session {
     scene: Scene,
-    integrator: Integrator,
+    engine: Box<dyn Engine>,
     film: Film,
-    /// What the method keeps of each tile beside its pixels.
-    tiles: Vec<TileState>,
     threads: Arc<rayon::ThreadPool>,
-    level: Level,
-    /// Bytes in which samples are kept for edits to come.
-    sample_memory: usize,
+    resources: Resources,
     /// Samples per pixel, on average, that the last edit left in the film.
-    kept: f64,
-    /// Time spent since the last edit on what a sample needs beforehand, and on samples.
-    spent: [Duration; 2],
+    left: f64,
+    spent: Spent,
 }
 
 impl Session {
@@ -64,30 +77,22 @@ impl Session {
     /// [`Self::new`] with certain vector instructions instead of the widest.
     #[must_use]
     pub fn with_level(scene: Scene, threads: Arc<rayon::ThreadPool>, level: Level) -> Self {
-        let integrator = threads.install(|| Integrator::new(&scene, level, 0));
-        let mut film = Film::new(scene.size);
-        let tiles = vec![TileState::default(); film.tiles_mut().len()];
-        let (kept, spent) = (0.0, [Duration::ZERO; 2]);
-        Self { integrator, film, tiles, scene, threads, level, sample_memory: 0, kept, spent }
+        Self::with_resources(scene, threads, Resources { level, edit_memory: 0 })
     }
 
-    /// From now on `path` keeps in so many bytes the first samples of each pixel, 32 bytes for each, so that an edit takes again
-    /// those alone that it touched; 0, as at first, keeps none. It changes no picture. What was rendered so far is begun anew if
-    /// the number of bytes changes. Other methods do not ask: photon mapping keeps what it needs, marching nothing.
-    pub fn keep_samples(&mut self, bytes: usize) {
-        if self.sample_memory != bytes {
-            self.sample_memory = bytes;
-            if matches!(self.integrator, Integrator::Path(_)) {
-                self.begin_anew();
-            }
-        }
+    /// [`Self::new`] with certain vector instructions, and with memory for what serves edits to come alone. That changes no
+    /// picture.
+    #[must_use]
+    pub fn with_resources(scene: Scene, threads: Arc<rayon::ThreadPool>, resources: Resources) -> Self {
+        let engine = threads.install(|| method_of(&scene.render.method).start(&scene, &resources));
+        let film = Film::new(scene.size);
+        Self { engine, film, scene, threads, resources, left: 0.0, spent: Spent::default() }
     }
 
     fn begin_anew(&mut self) {
         self.film = Film::new(self.scene.size);
-        self.tiles = vec![TileState::default(); self.film.tiles_mut().len()];
-        let Self { scene, threads, level, sample_memory, .. } = self;
-        self.integrator = threads.install(|| Integrator::new(scene, *level, *sample_memory));
+        let Self { scene, threads, resources, .. } = self;
+        self.engine = threads.install(|| method_of(&scene.render.method).start(scene, resources));
     }
 
     /// Goes on with an edited scene; gives what the edit changed. This is the only place where light is discarded, and the
@@ -95,104 +100,49 @@ impl Session {
     pub fn set_scene(&mut self, scene: Scene) -> Difference {
         let difference = Difference::between(&self.scene, &scene);
         let old = std::mem::replace(&mut self.scene, scene);
-        if self.integrator.is_touched_by(&difference) {
+        if self.engine.is_touched_by(&difference) {
             self.film = Film::new(self.scene.size);
-            self.tiles.resize_with(self.film.tiles_mut().len(), TileState::default);
-            let Self { integrator, tiles, scene, threads, .. } = self;
-            if !threads.install(|| integrator.update(&old, scene, &difference, tiles)) {
+            let Self { engine, scene, threads, .. } = self;
+            let edit = Edited { old: &old, new: scene, difference: &difference };
+            if !threads.install(|| engine.update(&edit, Film::tile_count(edit.new.size))) {
                 self.begin_anew();
             }
         } else {
-            self.integrator.count_anew(&mut self.tiles);
+            self.engine.count_anew();
         }
-        self.kept = self.film.mean_samples();
-        self.spent = [Duration::ZERO; 2];
+        self.left = self.film.mean_samples();
+        self.spent = Spent::default();
         difference
     }
 
-    /// Of what the session is made of, the share that was really computed since the last edit, or since the beginning:
-    /// of the `pixels` the share of their samples so far; of light paths (`photons`) and view-ray `segments` those computed.
+    /// What was computed since the last edit, or since the beginning, and what is kept for edits to come.
     #[must_use]
-    pub fn recomputed(&self) -> Vec<(&'static str, f64)> {
-        let share = |[all, computed]: [usize; 2]| computed as f64 / all.max(1) as f64;
-        match &self.integrator {
-            Integrator::RayMarch(_) | Integrator::Path(_) => {
-                let [width, height] = self.scene.size.map(f64::from);
-                let found: usize = self.tiles.iter().map(|tile| tile.samples()[2]).sum();
-                let samples = self.film.mean_samples();
-                let taken = samples - self.kept - found as f64 / (width * height);
-                vec![("pixels", if samples > 0.0 { taken.max(0.0) / samples } else { 0.0 })]
-            }
-            Integrator::Photon(photon) => {
-                let segments = self.tiles.iter().map(TileState::segments);
-                let segments = segments.fold([0; 2], |[a, b], [c, d]| [a + c, b + d]);
-                vec![("photons", share(photon.paths())), ("segments", share(segments))]
-            }
-        }
+    pub fn report(&self) -> MethodReport {
+        let pixels = self.scene.size.iter().map(|&n| n as usize).product();
+        let pixels = PixelCounts { pixels, samples: self.film.mean_samples(), left: self.left };
+        self.engine.report(&pixels)
     }
 
-    /// Of what is kept through edits beside pixels, how many light paths and segments, or samples, were computed since the last
-    /// edit; `None` where nothing is kept.
+    /// Of each kind of work item the share that was computed since the last edit, or since the beginning.
     #[must_use]
-    pub fn computed(&self) -> Option<usize> {
-        match &self.integrator {
-            Integrator::Photon(photon) => {
-                Some(photon.paths()[1] + self.tiles.iter().map(|tile| tile.segments()[1]).sum::<usize>())
-            }
-            Integrator::Path(path) if path.keeps() => {
-                Some(self.tiles.iter().map(|tile| tile.samples()[1]).sum())
-            }
-            Integrator::Path(_) | Integrator::RayMarch(_) => None,
-        }
+    pub fn recomputed(&self) -> Vec<WorkShare> {
+        self.report().recomputed
     }
 
-    /// Places on view rays where the first sample gathered photons since the last edit, or since the beginning: what segments
-    /// cost, which hold few or many of them.
+    /// A copy of what the session keeps through edits beside pixels, for checks; `None` where that is nothing.
     #[must_use]
-    pub fn gathers(&self) -> usize {
-        self.tiles.iter().map(TileState::gathers).sum()
+    pub fn kept_items(&self) -> Option<Box<dyn KeptItems>> {
+        self.engine.kept_items()
     }
 
-    /// A copy of what the session keeps through edits beside pixels, for checks.
+    /// Seconds that each stage of the work took since the last edit, or since the beginning.
     #[must_use]
-    pub fn snapshot(&self) -> Option<Kept> {
-        Kept::of(&self.integrator, &self.tiles)
-    }
-
-    /// Seconds spent since the last edit, or since the beginning: of a photon mapper on `photons` and on `segments` and later
-    /// passes, of others on `pixels`.
-    #[must_use]
-    pub fn spent(&self) -> Vec<(&'static str, f64)> {
-        let [before, samples] = self.spent.map(|time| time.as_secs_f64());
-        match &self.integrator {
-            Integrator::RayMarch(_) | Integrator::Path(_) => vec![("pixels", samples)],
-            Integrator::Photon(_) => vec![("photons", before), ("segments", samples)],
-        }
-    }
-
-    /// What is kept for edits to come: of each kind how many there are, and the bytes of all together. A photon mapper keeps
-    /// light `paths`, their `photons`, the `map` that sorts these, and `segments`; the path tracer `samples` if told so.
-    #[must_use]
-    pub fn kept(&self) -> Vec<(&'static str, [usize; 2])> {
-        match &self.integrator {
-            Integrator::RayMarch(_) => Vec::new(),
-            Integrator::Path(_) => {
-                let samples = self.tiles.iter().map(|tile| [tile.samples()[0], tile.bytes()]);
-                vec![("samples", samples.fold([0; 2], |[a, b], [c, d]| [a + c, b + d]))]
-            }
-            Integrator::Photon(photon) => {
-                let ([of_paths, of_photons, map], photons) = (photon.bytes(), photon.photons());
-                let paths = [photon.paths()[0], of_paths];
-                let segments = self.tiles.iter().map(|tile| [tile.segments()[0], tile.bytes()]);
-                let segments = segments.fold([0; 2], |[a, b], [c, d]| [a + c, b + d]);
-                vec![
-                    ("paths", paths),
-                    ("photons", [photons, of_photons]),
-                    ("map", [photons, map]),
-                    ("segments", segments),
-                ]
-            }
-        }
+    pub fn spent(&self) -> Vec<StageTime> {
+        let stages = self.report().stages;
+        let Spent { preparing, sampling } = self.spent;
+        let time = |name, time: Duration| StageTime { name, seconds: time.as_secs_f64() };
+        let preparation = stages.preparation.map(|name| time(name, preparing));
+        preparation.into_iter().chain([time(stages.sampling, sampling)]).collect()
     }
 
     /// Threads that work.
@@ -223,31 +173,22 @@ impl Session {
     /// as early as can be. Every sample follows from its pixel and number, so threads and slices leave
     /// no trace in the bits.
     pub fn refine(&mut self, budget: &Budget) -> Progress {
-        let stop = || Stop::when(&budget.cancel, budget.deadline);
-        let Self { scene, integrator, film, tiles, threads, spent, .. } = self;
-        while film.samples() < budget.samples && !stop().reached() {
+        let limits = Limits { cancel: &budget.cancel, deadline: budget.deadline };
+        let Self { scene, engine, film, threads, spent, .. } = self;
+        while film.samples() < budget.samples && !limits.stop().reached() {
             let so_far = film.samples();
             let begun = Instant::now();
-            let prepared = threads.install(|| integrator.prepare(scene, so_far, &stop));
-            spent[0] += begun.elapsed();
+            let prepared = threads.install(|| engine.prepare(scene, so_far, &limits));
+            spent.preparing += begun.elapsed();
             if !prepared {
                 break;
             }
             // Several passes at once, as soon as that delays no picture much, spare threads the waiting for each other.
-            let passes = (so_far / 4).clamp(1, 16).min(integrator.samples_at_once());
+            let passes = (so_far / 4).clamp(1, 16).min(engine.samples_at_once());
             let pass = so_far.saturating_add(passes).min(budget.samples);
-            let integrator = &*integrator;
             let begun = Instant::now();
-            let work = film.tiles_mut().par_iter_mut().zip(&mut *tiles).with_max_len(1);
-            threads.install(|| {
-                work.for_each(|(tile, state)| {
-                    let stop = stop();
-                    if !stop.reached() {
-                        integrator.refine(scene, tile, state, pass, &stop);
-                    }
-                });
-            });
-            spent[1] += begun.elapsed();
+            threads.install(|| engine.refine(scene, film.tiles_mut(), pass, &limits));
+            spent.sampling += begun.elapsed();
         }
         self.progress()
     }
@@ -262,9 +203,6 @@ impl Session {
     /// samples differ only by the pixel filter. Costs a walk over all pixels.
     #[must_use]
     pub fn relative_error(&self) -> Option<f64> {
-        match self.scene.render.integrator {
-            IntegratorKind::RayMarch { .. } => None,
-            IntegratorKind::Path | IntegratorKind::Photon(_) => self.film.relative_error(),
-        }
+        if self.engine.has_noise() { self.film.relative_error() } else { None }
     }
 }

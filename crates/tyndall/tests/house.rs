@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use tyndall::integrator::{METHODS, MethodEntry};
 
 /// From the ground up: a room may use its own floor and those before it.
 const FLOORS: [&[&str]; 10] = [
@@ -16,9 +17,6 @@ const FLOORS: [&[&str]; 10] = [
     &["integrator"],
     &["session"],
 ];
-
-/// Rooms of one floor that must not know each other.
-const METHODS: [&str; 3] = ["path", "photon", "raymarch"];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
@@ -61,18 +59,70 @@ fn imports_run_one_way() {
     assert!(imports > 50, "only {imports} imports were seen: the test reads nothing");
 }
 
+/// The folders of methods, by the list of methods.
+fn methods() -> Vec<String> {
+    METHODS.iter().map(MethodEntry::table).collect()
+}
+
+/// What stands in a file before its unit tests, without comments and citations.
+fn code(path: &Path) -> String {
+    let text = fs::read_to_string(path).expect("a source file");
+    let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+    code.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
+}
+
+/// Whether code names a method: as a module, as a word in quotes, or as a table of the document.
+fn names(code: &str, method: &str) -> bool {
+    let hyphens = method.replace('_', "-");
+    let mut spelt = vec![
+        format!("integrator::{method}"),
+        format!("super::{method}::"),
+        format!("render.{method}"),
+        format!("`{hyphens}`"),
+    ];
+    // "path" is the key of a file, too.
+    if method != "path" {
+        spelt.extend([format!("\"{hyphens}\""), format!("\"{method}\"")]);
+    }
+    spelt.iter().any(|name| code.contains(name))
+}
+
+#[test]
+fn a_method_is_named_in_its_folder_and_in_one_list() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let list = crates.join("tyndall/src/integrator/mod.rs").canonicalize().unwrap();
+    let (mut files, mut named_at_home) = (0, 0);
+    for room in ["tyndall", "formats", "live", "cli"] {
+        let root = crates.join(room).join("src").canonicalize().unwrap();
+        for path in sources(&root) {
+            // Benches measure certain methods; tests of a file may.
+            if path == list || path.components().any(|c| c.as_os_str() == "bench" || c.as_os_str() == "tests")
+            {
+                continue;
+            }
+            files += 1;
+            let code = code(&path);
+            for method in methods() {
+                let home = crates.join("tyndall/src/integrator").join(&method).canonicalize().unwrap();
+                let found = names(&code, &method);
+                named_at_home += usize::from(found && path.starts_with(&home));
+                assert!(!found || path.starts_with(&home), "{} names the method `{method}`", path.display());
+            }
+        }
+    }
+    assert!(files > 100 && named_at_home > 0, "{files} files, {named_at_home} names");
+}
+
 #[test]
 fn methods_do_not_know_each_other() {
-    for method in METHODS {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/integrator");
-        let own =
-            |path: &PathBuf| path.starts_with(folder.join(method)) || path.ends_with(format!("{method}.rs"));
-        let files: Vec<_> = sources(&folder).into_iter().filter(own).collect();
+    for method in methods() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/integrator").join(&method);
+        let files = sources(&folder);
         assert!(!files.is_empty(), "no file of `{method}`");
-        for text in files.iter().map(|path| fs::read_to_string(path).unwrap()) {
-            for other in METHODS.iter().filter(|m| **m != method) {
-                let named = [format!("super::{other}::"), format!("integrator::{other}")];
-                assert!(!named.iter().any(|name| text.contains(name)), "`{method}` imports `{other}`");
+        for code in files.iter().map(|path| code(path)) {
+            for other in methods().iter().filter(|other| **other != method) {
+                let known = [format!("super::{other}::"), format!("integrator::{other}")];
+                assert!(!known.iter().any(|name| code.contains(name)), "`{method}` imports `{other}`");
             }
         }
     }

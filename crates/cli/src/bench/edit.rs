@@ -5,9 +5,10 @@ use super::timing::{Effort, median};
 use crate::Failure;
 use serde_json::{Value, json};
 use std::time::Instant;
-use tyndall::scene::document;
+use tyndall::integrator::KeptCount;
 use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
+use tyndall_live::document;
 
 /// What an edit is held against.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -49,7 +50,7 @@ pub struct Cost {
     /// The whole from nothing with one segment per ray.
     pub plain: Option<f64>,
     /// See [`Session::kept`].
-    pub kept: Vec<(&'static str, [usize; 2])>,
+    pub kept: Vec<KeptCount>,
 }
 
 impl Edit<'_> {
@@ -70,8 +71,8 @@ impl Edit<'_> {
         if self.against == Against::First {
             scratch.add(&live, start);
         }
-        let (mut picture, mut all, mut kept) = (Vec::new(), computed(&live), live.kept());
-        let (mut all_gathers, mut gathers) = (live.gathers(), 0.0);
+        let (mut picture, mut all, mut kept) = (Vec::new(), computed(&live), live.report().kept);
+        let (mut all_gathers, mut gathers) = (gathers_of(&live), 0.0);
         let mut shares = [0.0; 2];
         let begun = Instant::now();
         let patient = |times: f64| begun.elapsed().as_secs_f64() < times * self.patience;
@@ -84,8 +85,8 @@ impl Edit<'_> {
                 let start = Instant::now();
                 let fresh = bench.render(&bench.scene(&after)?, level, 1);
                 scratch.add(&fresh, start);
-                (picture, all, kept) = (bits(&fresh), computed(&fresh), fresh.kept());
-                all_gathers = fresh.gathers();
+                (picture, all, kept) = (bits(&fresh), computed(&fresh), fresh.report().kept);
+                all_gathers = gathers_of(&fresh);
             }
             if self.plain && (round == 0 || patient(1.0)) {
                 let start = Instant::now();
@@ -97,7 +98,7 @@ impl Edit<'_> {
             edit.add(&live, start);
             let done = computed(&live);
             shares = [0, 1].map(|i| if all[i] > 0.0 { done[i] / all[i] } else { 0.0 });
-            gathers = live.gathers() as f64 / all_gathers.max(1) as f64;
+            gathers = gathers_of(&live) as f64 / all_gathers.max(1) as f64;
             if self.against == Against::Equal {
                 check(&bits(&live), &picture)?;
             }
@@ -143,7 +144,7 @@ struct Times([Vec<f64>; 3]);
 impl Times {
     fn add(&mut self, session: &Session, start: Instant) {
         let total = start.elapsed().as_secs_f64();
-        let [photons, segments] = stages(&session.spent());
+        let [photons, segments] = STAGES.map(|stage| seconds(session, stage));
         for (times, time) in self.0.iter_mut().zip([photons, segments, total]) {
             times.push(time);
         }
@@ -154,13 +155,24 @@ impl Times {
     }
 }
 
-fn stages(of_session: &[(&'static str, f64)]) -> [f64; 2] {
-    ["photons", "segments"]
-        .map(|stage| of_session.iter().find(|(name, _)| *name == stage).map_or(0.0, |(_, x)| *x))
+/// The stages of a photon mapper, which are its work items too.
+const STAGES: [&str; 2] = ["photons", "segments"];
+
+/// Seconds that a stage took since the last edit.
+pub fn seconds(session: &Session, stage: &str) -> f64 {
+    session.spent().iter().find(|time| time.name == stage).map_or(0.0, |time| time.seconds)
 }
 
+/// Of photons and segments the shares computed since the last edit.
 fn computed(session: &Session) -> [f64; 2] {
-    stages(&session.recomputed())
+    let recomputed = session.recomputed();
+    let share = |name| recomputed.iter().find(|work| work.name == name).map_or(0.0, |work| work.share);
+    STAGES.map(share)
+}
+
+/// Positions on view rays where photons were gathered since the last edit.
+fn gathers_of(session: &Session) -> usize {
+    session.report().counts.iter().find(|count| count.name == "gathers").map_or(0, |gathers| gathers.count)
 }
 
 /// The picture as bits: colour and alpha of all pixels, then their depth.

@@ -1,14 +1,14 @@
 //! How fast photons are gathered along view rays, and how well: the estimates against each other and against scalar code.
 
-use super::Row;
 use super::photon_scenes;
 use super::scenes::Bench;
 use super::timing::{Effort, median};
+use super::{Row, edit};
 use crate::Failure;
 use serde_json::{Value, json};
-use tyndall::scene::document;
 use tyndall::session::Session;
 use tyndall::simd::Level;
+use tyndall_live::document;
 
 const TABLE: &str = "gathering, default settings, one scattering; two threads";
 
@@ -51,7 +51,7 @@ fn scene(name: &str, bench: &Bench, effort: &Effort, level: Level) -> Result<Vec
     for _ in 0..effort.rounds {
         for (i, scene) in scenes.iter().enumerate() {
             let session = bench.render(scene, ways[i].1, 1);
-            times[i].push(seconds(&session));
+            times[i].push(edit::seconds(&session, "segments"));
             errors[i] = error(&picture(&session), &truth);
         }
     }
@@ -68,11 +68,6 @@ fn scene(name: &str, bench: &Bench, effort: &Effort, level: Level) -> Result<Vec
         }
     }
     Ok(rows)
-}
-
-/// That it took to gather.
-fn seconds(session: &Session) -> f64 {
-    session.spent().iter().find(|(stage, _)| *stage == "segments").map_or(0.0, |(_, seconds)| *seconds)
 }
 
 fn picture(session: &Session) -> Vec<f32> {

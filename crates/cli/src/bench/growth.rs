@@ -15,7 +15,7 @@ pub fn curves(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     let usual = json!({ "film": { "size": [128, 128] }, "render": { "max_scatter": 8 } });
     let mut rows = Vec::new();
     let mut measure = |bench: &Bench, row: String, patch: &Value, samples: u32| -> Result<(), Failure> {
-        let scene = bench.scene(&tyndall::scene::document::apply(&usual, patch))?;
+        let scene = bench.scene(&tyndall_live::document::apply(&usual, patch))?;
         let seconds = effort.seconds(&mut || drop(bench.render(&scene, level, samples)));
         rows.push(Row::new(TABLE, row, "time", "s", seconds));
         Ok(())

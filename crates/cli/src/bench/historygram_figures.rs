@@ -108,9 +108,9 @@ pub fn defaults(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
         Row::new(TABLE, name, "segments recomputed", "share", cost.shares[1]),
         Row::new(TABLE, name, "edit", "s", cost.edit[2]).at_most(0.25),
     ];
-    for (kind, [count, bytes]) in cost.kept {
-        let each = bytes as f64 / count.max(1) as f64;
-        rows.push(match kind {
+    for items in cost.kept {
+        let each = items.bytes as f64 / items.count.max(1) as f64;
+        rows.push(match items.name {
             "photons" => {
                 Row::new(TABLE, "memory", "a photon, beside its light", "bytes", each - BARE).at_most(16.0)
             }

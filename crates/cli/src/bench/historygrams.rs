@@ -7,8 +7,8 @@ use super::scenes::Bench;
 use super::timing::Effort;
 use crate::Failure;
 use serde_json::{Value, json};
-use tyndall::scene::document;
 use tyndall::simd::Level;
+use tyndall_live::document;
 
 /// A row of \[Jonsson12, table 1\]: seconds for photons and gathering without Historygrams and with them, the shares computed
 /// again, the overhead of setting up, and the speed-up.

@@ -9,9 +9,10 @@ use super::timing::{Effort, median};
 use crate::Failure;
 use serde_json::{Value, json};
 use std::time::Instant;
-use tyndall::scene::document;
+use tyndall::integrator::Resources;
 use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
+use tyndall_live::document;
 
 /// Samples of each pixel.
 const SAMPLES: u32 = 16;
@@ -30,8 +31,8 @@ struct Cost {
 
 /// Renders a scene from nothing, keeping its samples in so many bytes.
 fn render(bench: &Bench, patch: &Value, level: Level, bytes: usize) -> Result<Session, Failure> {
-    let mut session = Session::with_level(bench.scene(patch)?, bench.threads().clone(), level);
-    session.keep_samples(bytes);
+    let resources = Resources { level, edit_memory: bytes };
+    let mut session = Session::with_resources(bench.scene(patch)?, bench.threads().clone(), resources);
     session.refine(&Budget::samples(SAMPLES));
     Ok(session)
 }
@@ -66,11 +67,11 @@ fn cost(
             live.refine(&Budget::samples(samples));
             times.push(begun.elapsed().as_secs_f64());
         }
-        share = live.recomputed()[0].1;
+        share = live.recomputed()[0].share;
         check(&bits(&live), &bits(&fresh))?;
     }
-    let [(_, [samples, bytes])] = live.kept()[..] else { return Err(Failure::input("nothing is kept")) };
-    let bytes = bytes as f64 / samples as f64;
+    let [samples] = live.report().kept[..] else { return Err(Failure::input("nothing is kept")) };
+    let bytes = samples.bytes as f64 / samples.count as f64;
     Ok(Cost { scratch: scratch.map(median), edit: edit.map(median), share, bytes })
 }
 

@@ -4,11 +4,11 @@ use crate::Failure;
 use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::Arc;
-use tyndall::scene::document::{self, Document};
-use tyndall::scene::{Assets, Scene};
+use tyndall::scene::Scene;
 use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
-use tyndall_formats::assets;
+use tyndall_live::document::{self, Document};
+use tyndall_live::{Assets, Built, assets};
 
 /// A mostly empty volume with a thin dense shell, as CT is; 8-bit.
 pub fn ct(voxels: u32) -> Value {
@@ -58,7 +58,8 @@ impl Bench {
     /// The scene with a patch laid over it.
     pub fn scene(&self, patch: &Value) -> Result<Scene, Failure> {
         let document = Document::from_value(document::apply(&self.value, patch)).map_err(Failure::input)?;
-        self.threads.install(|| Scene::build(&document, &self.assets)).map_err(Failure::input)
+        let built = self.threads.install(|| Built::new(document, self.assets.clone()));
+        Ok(built.map_err(Failure::input)?.scene)
     }
 
     /// The threads that it renders on.

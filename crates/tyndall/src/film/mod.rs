@@ -159,6 +159,12 @@ impl Film {
         Self { size, tiles: (0..columns * rows).map(tile).collect() }
     }
 
+    /// Tiles of a film of a size.
+    #[must_use]
+    pub fn tile_count(size: [u32; 2]) -> usize {
+        size.map(|n| n.div_ceil(TILE) as usize).iter().product()
+    }
+
     /// Bytes that a film of a size keeps.
     #[must_use]
     pub fn bytes(size: [u32; 2]) -> u64 {

@@ -14,6 +14,23 @@ pub struct Stop<'a> {
     expired: Cell<bool>,
 }
 
+/// When work is to end: what every piece of it, on whatever thread, makes its [`Stop`] of.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits<'a> {
+    /// Raised from elsewhere to stop soon.
+    pub cancel: &'a AtomicBool,
+    /// Point in time at which to stop.
+    pub deadline: Option<Instant>,
+}
+
+impl<'a> Limits<'a> {
+    /// What one piece of work asks.
+    #[must_use]
+    pub fn stop(&self) -> Stop<'a> {
+        Stop::when(self.cancel, self.deadline)
+    }
+}
+
 /// The clock is read at the first of so many questions: it takes some 30 ns, a scattering takes hundreds.
 const QUESTIONS: u32 = 16;
 

@@ -28,46 +28,89 @@ struct Glow {
     per_volume: f32,
 }
 
-/// Glowing cells of a medium, weighted by what they emit.
+/// Glowing cells of a medium, weighted by what they emit. Cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Emission {
+    glowing: Arc<GlowingCells>,
+    /// Over the glowing cells.
+    cells: Arc<Discrete>,
+    density: f32,
+}
+
+/// Cells in which matter may glow, whatever its density.
+#[derive(Debug)]
+struct GlowingCells {
     places: Arc<Cells>,
-    cells: Discrete,
-    /// Number of the cell behind each weight, ascending.
+    /// Their numbers, ascending.
     numbers: Vec<usize>,
     bounds: Vec<Bounds>,
+    /// What each emits per unit of length, at density 1.
+    emitted: Vec<f32>,
     /// World volume per unit of index-space volume.
     voxel_volume: f32,
+}
+
+impl GlowingCells {
+    /// In parallel on the current pool.
+    fn new(medium: &Medium) -> Self {
+        let grid = medium.volume().grid();
+        let places = medium.volume().cells_of(CELL);
+        let glowing = |(number, &values): (usize, &[f32; 2])| {
+            let most = medium.transfer().emission_bound(values);
+            (most > 0.0).then(|| {
+                let bounds = places.cell_bounds(number, &grid.index_bounds());
+                let emitted = (1.0 - CAUTION) * mean_emission(medium, &bounds) + CAUTION * most;
+                (number, bounds, emitted)
+            })
+        };
+        let cells: Vec<_> = places.ranges().par_iter().enumerate().filter_map(glowing).collect();
+        Self {
+            numbers: cells.iter().map(|c| c.0).collect(),
+            bounds: cells.iter().map(|c| c.1).collect(),
+            emitted: cells.iter().map(|c| c.2).collect(),
+            voxel_volume: grid.voxel_size().powi(3),
+            places,
+        }
+    }
+
+    /// The chance of each, by its power; `None` where nothing glows.
+    fn choice(&self, density: f32) -> Option<Discrete> {
+        let power = |(emitted, bounds): (&f32, &Bounds)| {
+            f64::from(emitted * density * self.voxel_volume * bounds.size().element_product())
+        };
+        Discrete::new(self.emitted.iter().zip(&self.bounds).map(power))
+    }
 }
 
 impl Emission {
     /// `None` where nothing can glow.
     #[must_use]
     pub fn new(medium: &Medium) -> Option<Self> {
-        if !medium.transfer().emits() || medium.density() <= 0.0 {
+        Self::after(None, medium)
+    }
+
+    /// [`Self::new`], which shares what an edit left alone with the emission of a medium with the very same matter.
+    #[must_use]
+    pub fn after(same_matter: Option<&Self>, medium: &Medium) -> Option<Self> {
+        let density = medium.density();
+        if !medium.transfer().emits() || density <= 0.0 {
             return None;
         }
-        let grid = medium.volume().grid();
-        let places = medium.volume().cells_of(CELL);
-        let voxel_volume = grid.voxel_size().powi(3);
-        let glowing = |(number, &values): (usize, &[f32; 2])| {
-            let most = medium.transfer().emission_bound(values);
-            let b = places.cell_bounds(number, &grid.index_bounds());
-            let emitted = (1.0 - CAUTION) * mean_emission(medium, &b) + CAUTION * most;
-            let power = emitted * medium.density() * voxel_volume * b.size().element_product();
-            (most > 0.0).then_some((number, b, f64::from(power)))
-        };
-        let cells: Vec<_> = places.ranges().par_iter().enumerate().filter_map(glowing).collect();
-        let numbers = cells.iter().map(|c| c.0).collect();
-        let bounds = cells.iter().map(|c| c.1).collect();
-        let cells = Discrete::new(cells.iter().map(|c| c.2))?;
-        Some(Self { places, cells, numbers, bounds, voxel_volume })
+        if let Some(before) = same_matter.filter(|before| before.density.to_bits() == density.to_bits()) {
+            return Some(before.clone());
+        }
+        let glowing = || Arc::new(GlowingCells::new(medium));
+        let glowing = same_matter.map_or_else(glowing, |before| before.glowing.clone());
+        let cells = Arc::new(glowing.choice(density)?);
+        Some(Self { glowing, cells, density })
     }
 
     /// Whether points are drawn as from the other: each cell with the same chance.
     #[must_use]
     pub fn same_places(&self, other: &Self) -> bool {
-        self.numbers == other.numbers && self.cells == other.cells && self.bounds == other.bounds
+        let (here, there) = (&*self.glowing, &*other.glowing);
+        Arc::ptr_eq(&self.cells, &other.cells)
+            || (here.numbers == there.numbers && self.cells == other.cells && here.bounds == there.bounds)
     }
 
     /// As [`super::Light::strength`]: the power, as if it all came from the target's middle to its border.
@@ -113,7 +156,7 @@ impl Emission {
     /// The place `u` in a cell chosen by power, if it glows.
     fn glow(&self, medium: &Medium, choice: f32, u: Vec3) -> Option<Glow> {
         let (i, chance, _) = self.cells.sample(choice);
-        let b = &self.bounds[i];
+        let b = &self.glowing.bounds[i];
         let place = b.min + b.size() * u;
         if !medium.contains(place) {
             return None;
@@ -121,7 +164,7 @@ impl Emission {
         let optics = medium.optics(place);
         let sigma_t = medium.density() * optics.opacity;
         let emitted = optics.emitted() * sigma_t;
-        let per_volume = chance / (b.size().element_product() * self.voxel_volume);
+        let per_volume = chance / (b.size().element_product() * self.glowing.voxel_volume);
         (!emitted.is_black()).then_some(Glow { place, sigma_t, emitted, per_volume })
     }
 
@@ -129,9 +172,10 @@ impl Emission {
     /// with extinction `sigma_t`, `distance` world units away.
     #[must_use]
     pub fn pdf(&self, place: Vec3, sigma_t: f32, distance: f32) -> f32 {
-        let number = self.places.cell_at(place);
-        let Ok(i) = self.numbers.binary_search(&number) else { return 0.0 };
-        let volume = self.bounds[i].size().element_product() * self.voxel_volume;
+        let glowing = &*self.glowing;
+        let number = glowing.places.cell_at(place);
+        let Ok(i) = glowing.numbers.binary_search(&number) else { return 0.0 };
+        let volume = glowing.bounds[i].size().element_product() * glowing.voxel_volume;
         self.cells.probability(i) / volume * distance * distance / sigma_t
     }
 }

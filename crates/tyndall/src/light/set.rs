@@ -20,9 +20,14 @@ impl LightSet {
     /// Weighs the lights by what reaches the medium.
     #[must_use]
     pub fn new(lights: Vec<Light>, medium: &Medium) -> Self {
+        Self::with_emission(lights, medium, Emission::new(medium))
+    }
+
+    /// [`Self::new`] with the emission of the medium.
+    #[must_use]
+    pub fn with_emission(lights: Vec<Light>, medium: &Medium, emission: Option<Emission>) -> Self {
         let box_ = medium.volume().grid().world_bounds();
         let target = Target { center: box_.center(), radius: 0.5 * box_.size().length() };
-        let emission = Emission::new(medium);
         let of_matter = emission.iter().map(|e| e.strength(&target));
         let choice = Discrete::new(lights.iter().map(|l| l.strength(&target)).chain(of_matter));
         let passable = (0..lights.len()).filter(|&i| lights[i].can_be_passed()).collect();

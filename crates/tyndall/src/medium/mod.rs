@@ -46,6 +46,8 @@ pub struct Medium {
     volume: Arc<Volume>,
     transfer: Arc<TransferFunction>,
     majorants: Arc<MajorantGrid>,
+    /// As the settings have it.
+    cell_size: usize,
     clip: Clip,
     /// No track is longer: the diagonal of the box, world units.
     longest: f32,
@@ -92,11 +94,30 @@ impl Medium {
     /// Looks at `volume` through `transfer`; builds the majorants, in parallel on the current pool.
     #[must_use]
     pub fn new(volume: Arc<Volume>, transfer: Arc<TransferFunction>, settings: &MediumSettings) -> Self {
-        let majorants = MajorantGrid::new(&volume, &transfer, settings.majorant_cell);
+        Self::after(None, volume, transfer, settings)
+    }
+
+    /// [`Self::new`], which shares the majorants of a medium before an edit that left them alone: of the very same volume and
+    /// function, and with cells of the same size.
+    #[must_use]
+    pub fn after(
+        before: Option<&Self>,
+        volume: Arc<Volume>,
+        transfer: Arc<TransferFunction>,
+        settings: &MediumSettings,
+    ) -> Self {
+        let edge = settings.majorant_cell;
+        let kept = before.filter(|before| {
+            let same_matter =
+                Arc::ptr_eq(&before.volume, &volume) && Arc::ptr_eq(&before.transfer, &transfer);
+            same_matter && before.cell_size == edge
+        });
+        let majorants = || Arc::new(MajorantGrid::new(&volume, &transfer, edge));
         Self {
             clip: Clip::new(volume.grid(), &settings.clip),
             longest: volume.grid().diagonal(),
-            majorants: Arc::new(majorants),
+            majorants: kept.map_or_else(majorants, |before| before.majorants.clone()),
+            cell_size: edge,
             density: settings.density,
             phase: settings.phase,
             brdf: settings.brdf,
@@ -110,6 +131,24 @@ impl Medium {
     #[must_use]
     pub fn volume(&self) -> &Volume {
         &self.volume
+    }
+
+    /// The data, to be shared.
+    #[must_use]
+    pub fn shared_volume(&self) -> &Arc<Volume> {
+        &self.volume
+    }
+
+    /// The function from values to optics, to be shared.
+    #[must_use]
+    pub fn shared_transfer(&self) -> &Arc<TransferFunction> {
+        &self.transfer
+    }
+
+    /// Whether both see the very same data through the very same function.
+    #[must_use]
+    pub fn shares_matter(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.volume, &other.volume) && Arc::ptr_eq(&self.transfer, &other.transfer)
     }
 
     /// The function from values to optics.

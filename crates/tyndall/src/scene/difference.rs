@@ -80,7 +80,7 @@ impl Difference {
             camera: old.camera != new.camera,
             size: old.size != new.size,
             background: old.background != new.background,
-            method: old.render.integrator != new.render.integrator
+            method: old.render.method != new.render.method
                 || old.render.max_scatter != new.render.max_scatter,
             seed: old.render.seed != new.render.seed,
         }

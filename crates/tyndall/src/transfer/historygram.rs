@@ -106,12 +106,7 @@ impl HistoryGroups {
                 let share = f32::from(count) / ValueBins::COUNT as f32;
                 (0..ValueBins::COUNT).map(|bin| group(bin as f32 * share)).collect()
             }
-            Grouping::Quantile => {
-                let bins = volume.value_bins();
-                let ends = [1.0, (ValueBins::COUNT - 1) as f32].map(|place| f64::from(bins.value(place)));
-                let inside = volume.histogram(ends, ValueBins::INSIDE).counts;
-                equal_counts(&inside, count)
-            }
+            Grouping::Quantile => equal_counts(&volume.value_bin_histogram().counts, count),
         };
         Self { groups, count }
     }

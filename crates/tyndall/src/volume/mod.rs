@@ -22,7 +22,7 @@ pub use voxels::{Voxel, Voxels};
 
 use crate::math::{Vec3, cast};
 use bricks::Lattice;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use voxels::with_voxels;
 
 /// How the field is read between voxel centres.
@@ -89,9 +89,17 @@ pub struct Volume {
     robust_range: [f64; 2],
     non_finite: u64,
     cells: Arc<Cells>,
+    counts: Arc<Counts>,
     lattice: Lattice,
     slope: f32,
     intercept: f32,
+}
+
+/// Histograms that are counted once, when they are first asked for, and are then kept with the samples.
+#[derive(Debug, Default)]
+struct Counts {
+    robust: OnceLock<Histogram>,
+    value_bins: OnceLock<Histogram>,
 }
 
 impl Volume {
@@ -126,6 +134,7 @@ impl Volume {
             value_range,
             robust_range,
             non_finite,
+            counts: Arc::default(),
             slope: cast::single(slope),
             intercept: cast::single(intercept),
         })
@@ -236,6 +245,24 @@ impl Volume {
     #[must_use]
     pub fn histogram(&self, range: [f64; 2], bins: usize) -> Histogram {
         Histogram::new(&self.bricks, self.values, range, bins)
+    }
+
+    /// The histogram of the robust range in 256 bins, by which transfer functions find their thresholds.
+    #[must_use]
+    pub fn robust_histogram(&self) -> &Histogram {
+        /// Fine enough to place a threshold, coarse enough for every bin to mean something.
+        const BINS: usize = 256;
+        self.counts.robust.get_or_init(|| self.histogram(self.robust_range, BINS))
+    }
+
+    /// The histogram over the inner [`ValueBins`], all but the outermost two.
+    #[must_use]
+    pub fn value_bin_histogram(&self) -> &Histogram {
+        self.counts.value_bins.get_or_init(|| {
+            let bins = self.value_bins();
+            let ends = [1.0, (ValueBins::COUNT - 1) as f32].map(|border| f64::from(bins.value(border)));
+            self.histogram(ends, ValueBins::INSIDE)
+        })
     }
 
     /// The data value at a voxel.

@@ -3,10 +3,11 @@
 use crate::scenes::{Setup, blocks, mean, slab, trace};
 use std::sync::Arc;
 use tyndall::film::PixelSample;
-use tyndall::integrator::RayMarch;
+use tyndall::integrator::Method;
+use tyndall::integrator::path::PathTracer;
+use tyndall::integrator::raymarch::{RayMarch, Settings};
 use tyndall::math::{Ray, Rgb, Vec3};
 use tyndall::scattering::Phase;
-use tyndall::scene::IntegratorKind;
 use tyndall::scene::{Background, Scene};
 use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
@@ -38,8 +39,12 @@ fn alpha_depth_and_background_have_closed_forms() {
         let inside = (1.0 - through * (1.0 + tau)) / sigma;
         let expected = [3.0 * through, 1.0 - through, cos * (2.0 * (1.0 - through) + inside)];
         // The slab's voxel is wide: steps count in its cube root.
-        let march =
-            RayMarch::new(&scene, 1e-3 / 1e5_f32.powf(2.0 / 3.0), 1, Level::best()).march(&scene, &ray);
+        let march = RayMarch::of_scene(
+            &scene,
+            &Settings { step: 1e-3 / 1e5_f32.powf(2.0 / 3.0), light_samples: 1 },
+            Level::best(),
+        )
+        .march(&scene, &ray);
         for ((name, pick), expected) in PARTS.into_iter().zip(expected) {
             let marched = f64::from(pick(&march));
             assert!(
@@ -63,14 +68,14 @@ fn a_pixel_is_covered_as_far_as_matter_fills_it() {
     let covered = |integrator| {
         let mut scene = scene.clone();
         scene.size = [1, 1];
-        scene.render.integrator = integrator;
+        scene.render.method = integrator;
         let threads = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap());
         let mut session = Session::new(scene, threads);
         session.refine(&Budget::samples(4096));
         session.image().rgba[0][3]
     };
-    let walked = covered(IntegratorKind::Path);
-    let marched = covered(IntegratorKind::RayMarch { step: 0.5, light_samples: 1 });
+    let walked = covered(PathTracer::usual());
+    let marched = covered(RayMarch::choose(Settings { step: 0.5, light_samples: 1 }));
     for share in [walked, marched] {
         assert!((share - 0.75).abs() < 2e-3, "{share} of the pixel");
     }

@@ -1,21 +1,22 @@
 //! Every set of vector instructions gives the same picture, and the march the one that its definition says.
 
-use crate::photon::PHOTONS;
 use crate::scenes::{Setup, blocks, volume};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tyndall::camera::{Camera, Lens};
 use tyndall::film::Image;
-use tyndall::integrator::RayMarch;
+use tyndall::integrator::path::PathTracer;
+use tyndall::integrator::raymarch::{RayMarch, Settings};
+use tyndall::integrator::{METHODS, Method, MethodEntry};
 use tyndall::light::{Directional, Environment, Light, PointLight};
 use tyndall::math::{Ray, Rgb, Vec3};
 use tyndall::medium::Medium;
-use tyndall::scene::{IntegratorKind, Scene};
+use tyndall::scene::{MethodChoice, Scene};
 use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
 use tyndall::transfer::{Optics, Point};
 
-const MARCH: IntegratorKind = IntegratorKind::RayMarch { step: 0.5, light_samples: 3 };
+const MARCH: Settings = Settings { step: 0.5, light_samples: 3 };
 
 /// Glowing, reflecting and merely scattering matter between empty space, in 8^3 blocks and smaller.
 fn scene(majorant_cell: usize) -> Scene {
@@ -44,8 +45,8 @@ fn scene(majorant_cell: usize) -> Scene {
     scene
 }
 
-fn picture(mut scene: Scene, integrator: IntegratorKind, level: Level, samples: u32) -> Image {
-    scene.render.integrator = integrator;
+fn picture(mut scene: Scene, method: MethodChoice, level: Level, samples: u32) -> Image {
+    scene.render.method = method;
     let threads = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap());
     let mut session = Session::with_level(scene, threads, level);
     session.refine(&Budget::samples(samples));
@@ -59,10 +60,10 @@ fn farthest(a: &Image, b: &Image) -> f32 {
 
 #[test]
 fn every_level_marches_to_the_same_picture() {
-    let scalar = picture(scene(8), MARCH, Level::available()[0], 2);
+    let scalar = picture(scene(8), RayMarch::choose(MARCH), Level::available()[0], 2);
     assert!(scalar.rgba.iter().any(|p| p[3] > 0.6) && scalar.rgba.iter().any(|p| p[3] < 0.5));
     for level in Level::available() {
-        let apart = farthest(&scalar, &picture(scene(8), MARCH, level, 2));
+        let apart = farthest(&scalar, &picture(scene(8), RayMarch::choose(MARCH), level, 2));
         assert!(apart < 1e-3, "{apart} apart with {level:?}");
     }
 }
@@ -71,7 +72,7 @@ fn every_level_marches_to_the_same_picture() {
 #[test]
 fn every_level_traces_to_the_same_mean() {
     let mean = |level| {
-        let image = picture(scene(8), IntegratorKind::Path, level, 400);
+        let image = picture(scene(8), PathTracer::usual(), level, 400);
         let n = image.rgba.len() as f64;
         let sum: f64 = image.rgba.iter().map(|p| f64::from(p[1])).sum();
         let variance: f64 = image.variance.iter().map(|v| f64::from(v[1])).sum();
@@ -93,7 +94,7 @@ fn leaping_over_what_is_empty_changes_no_bit() {
         let emission = |cell| {
             let mut scene = scene(cell);
             scene.render.max_scatter = 0;
-            picture(scene, MARCH, level, 3)
+            picture(scene, RayMarch::choose(MARCH), level, 3)
         };
         let (leapt, plain) = (emission(8), emission(0));
         assert!(leapt.rgba.iter().any(|p| p[0] > 0.01));
@@ -107,7 +108,7 @@ fn a_packet_marches_as_the_rule_says() {
     let scene = scene(8);
     let medium: &Medium = &scene.medium;
     let step = 0.5 * medium.volume().grid().voxel_size();
-    let march = RayMarch::new(&scene, 0.5, 3, Level::best());
+    let march = RayMarch::of_scene(&scene, &MARCH, Level::best());
     let mut some = 0;
     for i in 0..200 {
         let angle = i as f32 * 0.37;
@@ -144,11 +145,11 @@ fn a_stop_takes_no_time() {
     let inside = PointLight { position: Vec3::new(0.1, 0.2, 0.3), intensity: Rgb::WHITE };
     setup.lights = vec![Light::Point(inside)];
     let whole = setup.scene();
-    let march = IntegratorKind::RayMarch { step: 0.001, light_samples: 1000 };
-    for integrator in [IntegratorKind::Path, march, IntegratorKind::Photon(PHOTONS)] {
+    let march = RayMarch::choose(Settings { step: 0.001, light_samples: 1000 });
+    for method in METHODS.iter().map(MethodEntry::default_settings).chain([march]) {
         let mut scene = whole.clone();
         scene.size = [256, 256];
-        scene.render.integrator = integrator;
+        scene.render.method = method.clone();
         let threads = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap());
         let mut session = Session::new(scene, threads);
         for _ in 0..5 {
@@ -158,7 +159,7 @@ fn a_stop_takes_no_time() {
             session.refine(&budget);
             // Asked for are 5 ms; a machine that does other things gets some more.
             let late = deadline.elapsed();
-            assert!(late < Duration::from_millis(300), "{late:?} late with {integrator:?}");
+            assert!(late < Duration::from_millis(300), "{late:?} late with {method:?}");
         }
     }
 }

@@ -7,12 +7,17 @@ use crate::seeds::{BLOCK, Estimate, PIXELS, estimate};
 use std::f64::consts::PI;
 use std::sync::Arc;
 use tyndall::camera::{Camera, Lens};
+use tyndall::integrator::Method;
+use tyndall::integrator::path::PathTracer;
+use tyndall::integrator::photon::{
+    self, Histories, HistoryBins, PhotonMapper, Settings as PhotonSettings, SpatialHistory,
+};
 use tyndall::light::{Directional, Disk, Environment, Light, Map, PointLight, Rect, SphereLight};
 use tyndall::math::{Rgb, Vec3};
 use tyndall::medium::ClipShape;
 use tyndall::scattering::{Abc, Brdf};
-use tyndall::scene::{self, Background, IntegratorKind, PhotonSettings, Scene, SpatialHistory};
-use tyndall::transfer::{Grouping, Optics, Point};
+use tyndall::scene::{Background, Scene};
+use tyndall::transfer::{Optics, Point};
 use tyndall::volume::{Grid, Space, ValueMap, Volume, Voxels};
 use tyndall_testing::Mean;
 
@@ -28,19 +33,20 @@ pub const PHOTONS: PhotonSettings = PhotonSettings {
     segments: 7,
     steps_per_voxel: 2.0,
     gather_spacing: 1.5,
-    estimate: scene::Estimate::Point,
-    histories: scene::Histories::Interactions,
+    estimate: photon::Estimate::Point,
+    nearest: 24,
+    histories: Histories::Interactions,
     history_bits: 64,
-    bins: Grouping::Quantile,
+    bins: HistoryBins::Quantile,
     spatial: SpatialHistory::Cells,
 };
 
 fn photons(scene: &Scene, settings: PhotonSettings) -> Estimate {
-    estimate(scene, IntegratorKind::Photon(settings), 1)
+    estimate(scene, &PhotonMapper::choose(settings), 1)
 }
 
 fn path(scene: &Scene) -> Estimate {
-    estimate(scene, IntegratorKind::Path, SAMPLES)
+    estimate(scene, &PathTracer::usual(), SAMPLES)
 }
 
 /// A cloud in [-1, 1]^3, without edges.
@@ -221,21 +227,21 @@ fn the_number_of_photons_is_no_brightness() {
 /// From the nearest photons, and along the beam.
 #[test]
 fn the_other_estimates() {
-    use scene::Estimate::{Beam, Nearest};
+    use photon::Estimate::{Beam, Nearest};
     let optics = Optics { surface: 0.5, ..Optics::default() };
     let setup = Setup { points: ramp(optics), phase: henyey_greenstein(0.4), ..sunny(0.0) };
     let scene = seen(setup, ASIDE, Vec3::ZERO, 1.6);
     let exact = path(&scene);
-    for (name, estimate_by, radius) in [("nearest", Nearest(24), 3.0), ("beam", Beam, 1.0)] {
+    for (name, estimate_by, radius) in [("nearest", Nearest, 3.0), ("beam", Beam, 1.0)] {
         let settings = PhotonSettings { estimate: estimate_by, radius, ..PHOTONS };
-        estimate(&scene, IntegratorKind::Photon(settings), 1).assert_near(&exact, BIAS, name);
+        estimate(&scene, &PhotonMapper::choose(settings), 1).assert_near(&exact, BIAS, name);
     }
 }
 
 /// Most gathers of thin matter may be left out: the same photons show the same picture.
 #[test]
 fn gathers_far_apart() {
-    for estimate in [scene::Estimate::Point, scene::Estimate::Beam] {
+    for estimate in [photon::Estimate::Point, photon::Estimate::Beam] {
         let at_each_step = PhotonSettings { estimate, gather_spacing: 0.0, ..PHOTONS };
         let exact = photons(&seen(sunny(0.8), ASIDE, Vec3::ZERO, 1.6), at_each_step);
         for gather_spacing in [0.5, 1.5, 4.0] {
@@ -344,7 +350,7 @@ fn refinement_converges() {
     const PASSES: u32 = 16;
     let scene = seen(sunny(0.8), ASIDE, Vec3::ZERO, 1.6);
     let settings = PhotonSettings { photons: 15_000, radius: 5.5, ..PHOTONS };
-    let after = |passes| estimate(&scene, IntegratorKind::Photon(settings), passes);
+    let after = |passes| estimate(&scene, &PhotonMapper::choose(settings), passes);
     let (exact, first, last) = (path(&scene), after(1), after(PASSES));
     let noise = |of: &Estimate| of.blocks.iter().map(Mean::variance_of_mean).sum::<f64>();
     let off = [first.blocks_off(&exact, 1), last.blocks_off(&exact, 1)];

@@ -4,13 +4,14 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use tyndall::camera::{Camera, Lens};
 use tyndall::film::PixelSample;
-use tyndall::integrator::Path;
+use tyndall::integrator::Method;
+use tyndall::integrator::path::PathTracer;
 use tyndall::light::{Light, LightSet};
 use tyndall::math::{Ray, Rgb, Vec3};
 use tyndall::medium::{ClipShape, Medium, MediumSettings};
 use tyndall::sampling::{PathSampler, Stream};
 use tyndall::scattering::{Brdf, HenyeyGreenstein, Phase};
-use tyndall::scene::{Background, IntegratorKind, RenderSettings, Scene};
+use tyndall::scene::{Background, RenderSettings, Scene};
 use tyndall::simd::Level;
 use tyndall::transfer::{Optics, Point, TransferFunction};
 use tyndall::volume::{Grid, Interpolation, ValueMap, Volume, Voxels};
@@ -66,7 +67,7 @@ impl Setup {
             size: [1, 1],
             background: Background::Environment,
             render: RenderSettings {
-                integrator: IntegratorKind::Path,
+                method: PathTracer::usual(),
                 max_scatter: self.max_scatter,
                 seed: self.seed,
             },
@@ -130,5 +131,5 @@ pub fn radiance(scene: &Scene, paths: u32, ray: impl Fn(&mut Stream) -> Ray + Sy
 }
 
 pub fn trace(scene: &Scene, ray: Ray, numbers: &mut PathSampler) -> PixelSample {
-    Path::new(Level::best()).trace(scene, ray, numbers.clone())
+    PathTracer::with_level(Level::best()).trace(scene, ray, numbers.clone())
 }

@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, LazyLock};
 use tyndall::film::Image;
-use tyndall::scene::{IntegratorKind, Scene};
+use tyndall::scene::{MethodChoice, Scene};
 use tyndall::session::{Budget, Session};
 use tyndall_testing::Mean;
 
@@ -33,7 +33,7 @@ fn block_means(image: &Image, edge: usize) -> Vec<f64> {
 }
 
 /// Of a scene by a method, with so many samples of each pixel.
-pub fn estimate(scene: &Scene, integrator: IntegratorKind, samples: u32) -> Estimate {
+pub fn estimate(scene: &Scene, method: &MethodChoice, samples: u32) -> Estimate {
     static POOL: LazyLock<Arc<rayon::ThreadPool>> =
         LazyLock::new(|| Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap()));
     let mut estimate = Estimate {
@@ -42,7 +42,7 @@ pub fn estimate(scene: &Scene, integrator: IntegratorKind, samples: u32) -> Esti
     };
     for seed in 1..=SEEDS {
         let mut scene = scene.clone();
-        (scene.render.integrator, scene.render.seed) = (integrator, seed);
+        (scene.render.method, scene.render.seed) = (method.clone(), seed);
         let mut session = Session::new(scene, POOL.clone());
         session.refine(&Budget::samples(samples));
         let image = session.image();

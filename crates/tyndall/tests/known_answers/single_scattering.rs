@@ -2,7 +2,7 @@
 
 use crate::scenes::{Setup, henyey_greenstein, matter, radiance, slab, volume};
 use std::f64::consts::PI;
-use tyndall::integrator::RayMarch;
+use tyndall::integrator::raymarch::{RayMarch, Settings};
 use tyndall::light::{Directional, Disk, Environment, Light, PointLight, Rect, SphereLight};
 use tyndall::math::{Ray, Rgb, Vec3};
 use tyndall::scene::Scene;
@@ -64,7 +64,11 @@ fn raymarch_and_the_order_of_its_step_error() {
     for case in &CASES {
         let scene = case.scene();
         let error = |steps: f64| {
-            let march = RayMarch::new(&scene, (1.0 / (steps * voxel)) as f32, 1, Level::best());
+            let march = RayMarch::of_scene(
+                &scene,
+                &Settings { step: (1.0 / (steps * voxel)) as f32, light_samples: 1 },
+                Level::best(),
+            );
             f64::from(march.march(&scene, &case.ray()).radiance.g) / case.expected() - 1.0
         };
         let (coarse, fine) = (error(32.0), error(256.0));
@@ -94,8 +98,12 @@ fn both_methods_agree_under_every_light() {
         setup.max_scatter = 1;
         let scene = setup.scene();
         let ray = Ray::new(Vec3::new(-0.4, -0.2, 3.0), -Vec3::Z);
-        let marched =
-            f64::from(RayMarch::new(&scene, 0.25, 512, Level::best()).march(&scene, &ray).radiance.g);
+        let marched = f64::from(
+            RayMarch::of_scene(&scene, &Settings { step: 0.25, light_samples: 512 }, Level::best())
+                .march(&scene, &ray)
+                .radiance
+                .g,
+        );
         let walked = radiance(&scene, 1_000_000, |_| ray);
         let error = walked.variance_of_mean().sqrt();
         assert!(error < 4e-3 * marched, "{name}: noise {error} of {marched}");

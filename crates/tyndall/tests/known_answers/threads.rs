@@ -5,13 +5,16 @@ use crate::scenes::{Setup, volume};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tyndall::film::Image;
+use tyndall::integrator::photon::{PhotonMapper, Settings as PhotonSettings};
+use tyndall::integrator::raymarch::{RayMarch, Settings};
+use tyndall::integrator::{METHODS, Method, method_of};
 use tyndall::light::{Directional, Environment, Light};
 use tyndall::math::{Rgb, Vec3};
-use tyndall::scene::{IntegratorKind, PhotonSettings, Scene};
+use tyndall::scene::{MethodChoice, Scene};
 use tyndall::session::{Budget, Session};
 use tyndall::transfer::{Optics, Point};
 
-fn scene(integrator: IntegratorKind) -> Scene {
+fn scene(method: MethodChoice) -> Scene {
     let value = |p: [usize; 3]| ((p[0] * 5 + p[1] * 3 + p[2] * 7) % 11) as f32 / 10.0;
     let glow = Optics { emission: Rgb::new(0.3, 0.1, 0.0), surface: 0.5, ..Optics::default() };
     let points = vec![
@@ -26,7 +29,7 @@ fn scene(integrator: IntegratorKind) -> Scene {
     setup.max_scatter = 8;
     let mut scene = setup.scene();
     scene.size = [50, 37];
-    scene.render.integrator = integrator;
+    scene.render.method = method;
     scene
 }
 
@@ -44,11 +47,13 @@ fn picture(scene: &Scene, threads: usize, slice: Option<Duration>) -> Image {
 
 #[test]
 fn threads_and_slices_leave_no_trace() {
-    let march = |step| IntegratorKind::RayMarch { step, light_samples: 4 };
+    let march = |step| RayMarch::choose(Settings { step, light_samples: 4 });
     // Without scattering a march stops between samples, of which it then takes many.
-    let photons = IntegratorKind::Photon(PhotonSettings { photons: 20_000, segments: 5, ..PHOTONS });
-    for (kind, max_scatter) in [(IntegratorKind::Path, 8), (march(0.5), 8), (march(0.01), 0), (photons, 8)] {
-        let mut scene = scene(kind);
+    let photons = PhotonMapper::choose(PhotonSettings { photons: 20_000, segments: 5, ..PHOTONS });
+    let all = METHODS.iter().map(|method| (method.draft(&method.default_settings()), 8));
+    for (choice, max_scatter) in all.chain([(march(0.5), 8), (march(0.01), 0), (photons, 8)]) {
+        let has_noise = method_of(&choice).has_noise;
+        let mut scene = scene(choice);
         scene.render.max_scatter = max_scatter;
         let one = picture(&scene, 1, None);
         assert!(one.rgba.iter().any(|p| p[3] > 0.0) && one.rgba.iter().any(|p| p[3] < 1.0));
@@ -57,10 +62,6 @@ fn threads_and_slices_leave_no_trace() {
         assert_eq!(one, picture(&scene, 2, Some(Duration::from_micros(300))));
         let mut other = scene.clone();
         other.render.seed += 1;
-        assert_eq!(
-            !matches!(kind, IntegratorKind::RayMarch { .. }),
-            one != picture(&other, 2, None),
-            "only Monte Carlo has a seed"
-        );
+        assert_eq!(has_noise, one != picture(&other, 2, None), "only what has noise has a seed");
     }
 }

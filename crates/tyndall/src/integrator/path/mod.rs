@@ -3,277 +3,123 @@
 //!
 //! A path flies to a collision, asks one light for what it sends there, scatters, and flies on. Light
 //! found by the two ways is weighed by the balance heuristic \[Veach97\]. Paths have any length and no stack.
+//! A session that is to be edited keeps samples with what they depend on, so that an edit takes again those alone that it
+//! touched.
 
-mod kept;
+mod samples;
+mod settings;
+mod tracer;
 
-pub(super) use kept::SampleTile;
+pub use settings::Settings;
 
-use super::Stop;
-use super::history::{Past, Writer};
+use super::{
+    Edited, ItemChanges, KeptCount, KeptItems, Method, MethodReport, MovedKey, PixelCounts, Resources, Stop,
+};
 use crate::film::{PixelSample, Tile};
-use crate::light::LightSample;
-use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::FlightNotes;
-use crate::sampling::{BounceSample, PathSampler};
-use crate::scattering::Event;
+use crate::math::Ray;
+use crate::sampling::PathSampler;
 use crate::scene::{Difference, Scene};
-use crate::simd::{Kernel, Lanes, Level};
-use kept::{Keeper, Query};
-use std::ops::ControlFlow;
+use crate::simd::Level;
+use rayon::prelude::*;
+use samples::{SampleCounts, SampleKeeper, SampleTile};
+use std::any::Any;
+use tracer::{CameraPath, Refine, Trace};
 
 /// The path tracer. If it may keep samples, an edit takes again those alone that it touched.
 #[derive(Debug)]
-pub struct Path {
+pub struct PathTracer {
     level: Level,
-    keeper: Option<Keeper>,
+    keeper: Option<SampleKeeper>,
 }
 
-/// A path whose throughput falls below this lives on by chance: at 1 every path does, with the share of light that it
-/// still carries. Against 1/4 this makes the same error in 0.75 (coloured cloud) to 1.02 (white cloud) of the time.
-const ROULETTE_WEIGHT: f32 = 1.0;
+/// What is kept of a tile.
+#[derive(Debug, Default)]
+pub struct TileState {
+    /// A path that a stop left half done.
+    pending: Option<CameraPath>,
+    samples: SampleTile,
+}
 
-impl Path {
+impl PathTracer {
     /// With these vector instructions; keeps nothing.
     #[must_use]
-    pub fn new(level: Level) -> Self {
+    pub fn with_level(level: Level) -> Self {
         Self { level, keeper: None }
-    }
-
-    /// That keeps samples of a scene for edits to come, as many of each pixel as so many bytes hold.
-    pub(super) fn keeping(scene: &Scene, level: Level, bytes: usize) -> Self {
-        Self { level, keeper: Keeper::new(scene, bytes) }
-    }
-
-    /// Whether it keeps samples.
-    #[must_use]
-    pub fn keeps(&self) -> bool {
-        self.keeper.is_some()
-    }
-
-    /// What an edit asks the samples for that are kept; `None` where nothing of them is left.
-    pub(super) fn update(&mut self, old: &Scene, new: &Scene, difference: &Difference) -> Option<Query> {
-        self.keeper.as_mut()?.update(old, new, difference)
-    }
-
-    /// Adds one path to every pixel of a tile until each has `samples`; see [`super::Integrator::refine`].
-    pub(super) fn refine(
-        &self,
-        scene: &Scene,
-        tile: &mut Tile,
-        (pending, kept): (&mut Option<Walk>, &mut SampleTile),
-        samples: u32,
-        stop: &Stop,
-    ) {
-        self.level.run(Refine { scene, tile, pending, kept, keeper: self.keeper.as_ref(), samples, stop });
     }
 
     /// An unbiased estimate of the radiance that arrives along a world ray.
     #[must_use]
     pub fn trace(&self, scene: &Scene, ray: Ray, numbers: PathSampler) -> PixelSample {
-        self.level.run(Trace { scene, walk: Walk::new(ray, numbers) })
+        self.level.run(Trace { scene, path: CameraPath::new(ray, numbers) })
     }
 }
 
-struct Refine<'a> {
-    scene: &'a Scene,
-    tile: &'a mut Tile,
-    pending: &'a mut Option<Walk>,
-    kept: &'a mut SampleTile,
-    keeper: Option<&'a Keeper>,
-    samples: u32,
-    stop: &'a Stop<'a>,
-}
+impl Method for PathTracer {
+    const NAME: &'static str = "path";
+    const ABOUT: &'static str =
+        "Unbiased, progressive path tracing through all orders of scattering: the ground truth.";
+    const MOVED_KEYS: &'static [MovedKey] = &[MovedKey { key: "majorant_cell", now: "medium.majorant_cell" }];
 
-impl Kernel for Refine<'_> {
-    type Output = ();
+    type Settings = Settings;
+    type TileState = TileState;
 
-    #[inline(always)]
-    fn run<S: Lanes>(self, simd: S) {
-        let Self { scene, tile, pending, kept, keeper, samples, stop } = self;
-        while tile.samples() < samples {
-            let number = tile.taken();
-            if let Some(sample) = kept.get(number) {
-                tile.add(&sample);
-                continue;
-            }
-            let (mut pixels, sample) = tile.next(1);
-            let Some(pixel) = pixels.next() else { return };
-            drop(pixels);
-            let mut walk = pending.take().unwrap_or_else(|| Walk::of_pixel(scene, pixel, sample));
-            let keeper = keeper.filter(|keeper| keeper.wants(kept, tile));
-            let ended = if let Some(keeper) = keeper {
-                let mut writer = keeper.reading.writer(&scene.medium, walk.past);
-                let ended = walk.go_on(simd, scene, stop, &mut writer);
-                walk.past = writer.past;
-                ended
-            } else {
-                walk.go_on(simd, scene, stop, &mut ())
-            };
-            if !ended {
-                *pending = Some(walk);
-                return;
-            }
-            if keeper.is_some() {
-                kept.put(number, &walk.seen, &walk.past, tile.pixel_count());
-            }
-            tile.add(&walk.seen);
-        }
-    }
-}
-
-/// What hears of all that a path reads.
-trait PathNotes: FlightNotes {
-    /// The optics of a value where light scatters.
-    fn scatters(&mut self, value: f32);
-}
-
-/// Nobody listens.
-impl PathNotes for () {
-    #[inline(always)]
-    fn scatters(&mut self, _: f32) {}
-}
-
-impl PathNotes for Writer<'_> {
-    #[inline(always)]
-    fn scatters(&mut self, value: f32) {
-        self.past.scatter |= self.read(value);
-    }
-}
-
-struct Trace<'a> {
-    scene: &'a Scene,
-    walk: Walk,
-}
-
-impl Kernel for Trace<'_> {
-    type Output = PixelSample;
-
-    #[inline(always)]
-    fn run<S: Lanes>(mut self, simd: S) -> PixelSample {
-        while !self.walk.go_on(simd, self.scene, &Stop::never(), &mut ()) {}
-        self.walk.seen
-    }
-}
-
-/// A path on its way.
-#[derive(Clone, Debug)]
-pub(super) struct Walk {
-    numbers: PathSampler,
-    ray: Ray,
-    throughput: Rgb,
-    /// Density of the ray's direction; none was drawn for the camera's own ray.
-    pdf: Option<f32>,
-    /// Scatterings so far.
-    order: u32,
-    seen: PixelSample,
-    /// What it depends on, if that is noted.
-    past: Past,
-}
-
-impl Walk {
-    fn new(ray: Ray, numbers: PathSampler) -> Self {
-        let seen = PixelSample::default();
-        Self { numbers, ray, throughput: Rgb::WHITE, pdf: None, order: 0, seen, past: Past::NOTHING }
+    fn new(scene: &Scene, settings: &Settings, resources: &Resources) -> Self {
+        let wanted = u64::from(settings.history_memory) << 20;
+        let bytes = usize::try_from(wanted).unwrap_or(usize::MAX).min(resources.edit_memory);
+        Self { level: resources.level, keeper: SampleKeeper::new(scene, bytes) }
     }
 
-    fn of_pixel(scene: &Scene, [x, y]: [u32; 2], sample: u32) -> Self {
-        let numbers = PathSampler::new(scene.render.seed, y * scene.size[0] + x, sample);
-        let (in_pixel, on_lens) = numbers.camera();
-        let film = [x as f32 + in_pixel[0], y as f32 + in_pixel[1]];
-        Self::new(scene.camera.ray(scene.size, film, on_lens), numbers)
+    fn is_touched_by(&self, difference: &Difference) -> bool {
+        // Cells decide which numbers tracking draws.
+        difference.view() || difference.light() || difference.majorants || difference.seed
     }
 
-    /// Goes on to the path's end, or for one scattering at least when told to stop; gives whether it has ended.
-    #[inline(always)]
-    fn go_on<S: Lanes>(&mut self, simd: S, scene: &Scene, stop: &Stop, notes: &mut impl PathNotes) -> bool {
-        while self.scatter(simd, scene, notes).is_continue() {
-            if stop.reached() {
-                return false;
-            }
-        }
+    fn update(&mut self, edit: &Edited, tiles: &mut [TileState]) -> bool {
+        let Some(query) = self.keeper.as_mut().and_then(|keeper| keeper.update(edit)) else { return false };
+        tiles.par_iter_mut().for_each(|tile| {
+            tile.pending = None;
+            tile.samples.ask(&query);
+        });
         true
     }
 
-    /// Flies to the next collision, gathers light there and scatters; breaks where the path ends.
-    #[inline(always)]
-    fn scatter<S: Lanes>(&mut self, simd: S, scene: &Scene, notes: &mut impl PathNotes) -> ControlFlow<()> {
-        let medium = &*scene.medium;
-        let Self { numbers, ray, throughput, pdf, order, seen, .. } = self;
-        let u = numbers.bounce(*order);
-        let track = medium.track(ray, f32::INFINITY);
-        let collision = medium.free_flight_noting(&track, u.flight_depth(), &mut numbers.stream, notes);
-        let reach = collision.map_or(f32::INFINITY, |c| track.distance(c.t));
-        if let Some(pdf) = *pdf {
-            seen.radiance += *throughput * scene.lights.passed(ray, reach, pdf);
+    fn count_anew(&mut self, tiles: &mut [TileState]) {
+        tiles.iter_mut().for_each(|tile| tile.samples.counts = SampleCounts::default());
+    }
+
+    fn refine(&self, scene: &Scene, tile: &mut Tile, state: &mut TileState, samples: u32, stop: &Stop) {
+        let TileState { pending, samples: kept } = state;
+        self.level.run(Refine { scene, tile, pending, kept, keeper: self.keeper.as_ref(), samples, stop });
+    }
+
+    fn report(&self, tiles: &[TileState], pixels: &PixelCounts) -> MethodReport {
+        let sum = |of: fn(&SampleTile) -> usize| tiles.iter().map(|tile| of(&tile.samples)).sum::<usize>();
+        let kept = KeptCount { name: "samples", count: sum(SampleTile::len), bytes: sum(SampleTile::bytes) };
+        MethodReport {
+            kept: vec![kept],
+            items_computed: self.keeper.as_ref().map(|_| sum(|tile| tile.counts.taken)),
+            ..MethodReport::of_pixels(pixels, sum(|tile| tile.counts.found))
         }
-        let Some(collision) = collision else {
-            if *order == 0 {
-                seen.radiance += scene.behind(ray.direction);
-            }
-            return ControlFlow::Break(());
-        };
-        let optics = medium.transfer().optics(collision.value);
-        // Where the path ends only the glow is read, by which lights are drawn: other than at once, such a path asked a light.
-        if *order < scene.render.max_scatter || *order == 0 {
-            notes.scatters(collision.value);
-        }
-        if *order == 0 {
-            seen.alpha = 1.0;
-            seen.depth = reach * ray.direction.dot(scene.camera.view());
-        }
-        let emitted = optics.emitted();
-        if !emitted.is_black() {
-            let sigma_t = medium.density() * optics.opacity;
-            let weight =
-                pdf.map_or(1.0, |pdf| scene.lights.flight_weight(collision.place, sigma_t, reach, pdf));
-            seen.radiance += *throughput * emitted * weight;
-        }
-        if *order == scene.render.max_scatter {
-            return ControlFlow::Break(());
-        }
-        let event = medium.event(collision.place, &optics);
-        let here = medium.volume().grid().index_to_world(collision.place);
-        seen.radiance +=
-            *throughput * direct(simd, scene, &event, here, -ray.direction, &u, (numbers, notes));
-        let Some(scattered) = event.sample(-ray.direction, u.scatter) else { return ControlFlow::Break(()) };
-        *throughput *= scattered.weight;
-        let brightest = throughput.max_component();
-        if brightest < ROULETTE_WEIGHT {
-            let survival = brightest / ROULETTE_WEIGHT;
-            if u.roulette >= survival {
-                return ControlFlow::Break(());
-            }
-            *throughput /= survival;
-        }
-        *ray = Ray::new(here, scattered.direction);
-        *pdf = Some(scattered.pdf);
-        *order += 1;
-        ControlFlow::Continue(())
+    }
+
+    fn kept_items(&self, tiles: &[TileState]) -> Option<Box<dyn KeptItems>> {
+        let samples = || tiles.iter().map(|tile| tile.samples.clone()).collect();
+        self.keeper.as_ref().map(|_| Box::new(KeptSamples(samples())) as _)
     }
 }
 
-/// Next-event estimation: what one light, drawn by power, sends to a point and on to `w_out`.
-#[inline(always)]
-fn direct<S: Lanes>(
-    simd: S,
-    scene: &Scene,
-    event: &Event,
-    here: Vec3,
-    w_out: Vec3,
-    u: &BounceSample,
-    (numbers, notes): (&mut PathSampler, &mut impl FlightNotes),
-) -> Rgb {
-    let medium = &*scene.medium;
-    let Some(light) = scene.lights.sample(medium, here, u, &mut numbers.stream) else { return Rgb::BLACK };
-    let unshadowed = event.eval(w_out, light.direction) * light.radiance * balance(event, w_out, &light);
-    if unshadowed.is_black() {
-        return Rgb::BLACK;
-    }
-    let track = medium.track(&Ray::new(here, light.direction), light.distance);
-    unshadowed * medium.transmittance_lanes(simd, &track, &mut numbers.stream, notes)
-}
+/// The samples of all tiles at one time.
+struct KeptSamples(Vec<SampleTile>);
 
-/// Weight of drawing the light against drawing the scattered direction.
-fn balance(event: &Event, w_out: Vec3, light: &LightSample) -> f32 {
-    if light.pdf.is_infinite() { 1.0 } else { light.pdf / (light.pdf + event.pdf(w_out, light.direction)) }
+impl KeptItems for KeptSamples {
+    fn compare(&self, other: &dyn KeptItems) -> ItemChanges {
+        let other: &dyn Any = other;
+        let other = other.downcast_ref::<Self>().map_or(&[][..], |other| &other.0);
+        let mut changes = ItemChanges::default();
+        for (i, samples) in self.0.iter().enumerate() {
+            let alone = ItemChanges { differing: 0, new: samples.len() };
+            changes += other.get(i).map_or(alone, |other| samples.compare(other));
+        }
+        changes
+    }
 }

@@ -2,12 +2,12 @@
 //! traced again where an edit touched them.
 
 use super::paths::{Begun, Interactions, Photon, Tracer, Walk, bounce_of};
+use super::settings;
 use super::spatial::Changed;
 use crate::integrator::Stop;
 use crate::integrator::history::{Histories, Past};
 use crate::math::cast;
 use crate::sampling::LightPathSampler;
-use crate::scene;
 use crate::simd::{Kernel, Lanes};
 use std::ops::Range;
 
@@ -87,8 +87,8 @@ impl Traced {
 
 impl Chunk {
     /// Paths yet to be traced.
-    pub fn new(paths: Vec<u32>, groups: u8, histories: scene::Histories) -> Self {
-        let traced = Traced::new(groups, histories == scene::Histories::Interactions);
+    pub fn new(paths: Vec<u32>, groups: u8, histories: settings::Histories) -> Self {
+        let traced = Traced::new(groups, histories == settings::Histories::Interactions);
         Self { paths, traced, changed: Past::NOTHING, underway: None }
     }
 

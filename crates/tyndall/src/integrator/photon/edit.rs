@@ -1,27 +1,18 @@
 //! What of light paths, photons and segments an edit leaves valid.
 
 use super::lights::{LightPaths, Plan, sources};
-use super::{PhotonMapping, SegmentTile, places_for, step};
+use super::{PhotonMapper, SegmentTile, places_for, step};
+use crate::integrator::Edited;
 use crate::integrator::history::Touched;
 use crate::light::Light;
-use crate::scene::{Difference, Scene};
+use crate::scene::Scene;
 use std::sync::atomic::Ordering;
 
-impl PhotonMapping {
+impl PhotonMapper {
     /// Drops what an edit touched of paths, photons and segments, and nothing else; false where all is to begin anew.
-    pub(crate) fn update(
-        &mut self,
-        old: &Scene,
-        new: &Scene,
-        difference: &Difference,
-        tiles: &mut [&mut Option<SegmentTile>],
-    ) -> bool {
-        if difference.method
-            || difference.volume
-            || difference.majorants
-            || difference.clip
-            || difference.seed
-        {
+    pub(super) fn keep_valid(&mut self, edit: &Edited, tiles: &mut [Option<SegmentTile>]) -> bool {
+        let Edited { old, new, difference } = *edit;
+        if difference.volume || difference.majorants || difference.clip || difference.seed {
             return false;
         }
         let mut touched = Touched::new(&self.ground.reading.groups, old, new, difference);
@@ -52,7 +43,7 @@ impl PhotonMapping {
         for tile in tiles {
             match tile {
                 Some(tile) if self.has_segments => tile.add_change(touched.view),
-                tile => **tile = None,
+                tile => *tile = None,
             }
         }
         true

@@ -3,10 +3,10 @@
 use super::kernel::{Ball, Kernel, Slice};
 use super::map::PhotonMap;
 use super::matter::Matter;
+use super::settings::Estimator;
 use crate::math::{PackedDirection, Rgb, Vec3};
 use crate::medium::{MarchNotes, Medium};
 use crate::scattering::{Brdf, Event, Phase};
-use crate::scene::Estimate;
 use crate::simd::{Lanes, unpack_directions};
 use fearless_simd::prelude::*;
 use std::f32::consts::{FRAC_1_PI, PI};
@@ -41,12 +41,12 @@ impl PhotonMap {
     ) -> Rgb {
         let (points, number) = (&self.points, number_of(at.place));
         match self.estimate {
-            Estimate::Point => self.within(simd, medium, at, Ball::new(1.0, number, points), notes),
-            Estimate::Nearest(count) => {
+            Estimator::Point => self.within(simd, medium, at, Ball::new(1.0, number, points), notes),
+            Estimator::Nearest(count) => {
                 let radius = self.radius_of(simd, at, count as usize, distances);
                 self.within(simd, medium, at, Ball::new(radius, number, points), notes)
             }
-            Estimate::Beam => {
+            Estimator::Beam => {
                 let slice = Slice::new(at.width / self.radius, -at.w_out, number, points);
                 self.within(simd, medium, at, slice, notes)
             }

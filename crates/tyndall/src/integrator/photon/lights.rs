@@ -2,13 +2,14 @@
 
 use super::chunk::{self, Chunk, Update};
 use super::paths::{Source, Tracer};
+use super::settings::{Histories, Settings};
 use super::spatial::Changed;
-use crate::integrator::Stop;
+use crate::integrator::Limits;
 use crate::integrator::history::Reading;
 use crate::light::{Enclosure, Light};
 use crate::math::{Rgb, cast};
 use crate::sampling::LightPathSampler;
-use crate::scene::{Histories, PhotonSettings, Scene};
+use crate::scene::Scene;
 use crate::simd::Level;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -47,12 +48,12 @@ pub(super) struct Plan {
 
 impl Plan {
     /// For so many sources: each has as many paths as the others.
-    pub fn new(scene: &Scene, settings: &PhotonSettings, pass: u32, sources: usize) -> Self {
+    pub fn new(scene: &Scene, settings: &Settings, pass: u32, sources: usize) -> Self {
         Self {
             count: (settings.photons / cast::fit_u32(sources.max(1))).max(1),
             seed: scene.render.seed,
             pass,
-            groups: settings.history_bits,
+            groups: settings.groups(),
             histories: settings.histories,
         }
     }
@@ -125,14 +126,14 @@ impl LightPaths {
 }
 
 /// Traces what is not valid; false where a stop came first. Counts the paths traced.
-pub(super) fn trace<'s>(
+pub(super) fn trace(
     lights: &mut [LightPaths],
     scene: &Scene,
     ground: &Ground,
     pass: u32,
     places: &Changed,
     traced: &AtomicUsize,
-    stop: &(impl Fn() -> Stop<'s> + Sync),
+    limits: &Limits,
 ) -> bool {
     let seed = scene.render.seed;
     let mut work: Vec<(&mut Chunk, Source, u32)> = Vec::new();
@@ -144,7 +145,7 @@ pub(super) fn trace<'s>(
     }
     let unfinished = AtomicUsize::new(work.len());
     work.into_par_iter().with_max_len(1).for_each(|(chunk, source, stream)| {
-        let stop = stop();
+        let stop = limits.stop();
         if !stop.reached() {
             let Ground { reading, enclosure, .. } = ground;
             let tracer = Tracer { scene, source, enclosure, reading };

@@ -3,9 +3,9 @@
 use super::chunk::Chunk;
 use super::grid::CellGrid;
 use super::kernel::Points;
+use super::settings::Estimator;
 use crate::math::{DVec3, Vec3, cast};
 use crate::medium::Medium;
-use crate::scene::Estimate;
 use rayon::prelude::*;
 
 /// Interactions in the order of their cells, then of lights, paths and bounces, so that sums do not depend on what was
@@ -16,7 +16,7 @@ pub(super) struct PhotonMap {
     /// World units.
     pub(super) radius: f32,
     pub(super) points: Points,
-    pub(super) estimate: Estimate,
+    pub(super) estimate: Estimator,
     /// Where each cell begins.
     starts: Vec<u32>,
     pub(super) x: Vec<f32>,
@@ -46,7 +46,7 @@ const CHUNK_BITS: u32 = 20;
 
 impl PhotonMap {
     /// Sorts the photons of all lights; `radius` in world units.
-    pub fn new(medium: &Medium, grid: CellGrid, radius: f32, estimate: Estimate, lights: &[Lit]) -> Self {
+    pub fn new(medium: &Medium, grid: CellGrid, radius: f32, estimate: Estimator, lights: &[Lit]) -> Self {
         let chunks: Vec<(&Chunk, DVec3)> =
             lights.iter().flat_map(|lit| lit.chunks.iter().map(|chunk| (chunk, lit.scale))).collect();
         assert!(chunks.len() < 1 << CHUNK_BITS, "{} chunks", chunks.len());

@@ -20,32 +20,37 @@ mod matter;
 mod pass;
 mod paths;
 mod segments;
+mod settings;
 mod spatial;
 mod view;
 
-pub(crate) use segments::SegmentTile;
+pub use settings::{Estimate, Histories, HistoryBins, Settings, SpatialHistory};
 
-use super::Stop;
 use super::history::Reading;
+use super::{
+    Edited, ItemChanges, KeptCount, KeptItems, Limits, MemoryNeed, Method, MethodReport, NamedCount,
+    PixelCounts, Resources, SettingProblem, Stages, Stop, WorkShare,
+};
 use crate::film::Tile;
 use crate::light::Enclosure;
 use crate::math::DVec3;
-use crate::scene::{Estimate, PhotonSettings, Scene, SpatialHistory};
-use crate::simd::Level;
+use crate::scene::{Difference, Scene};
 use grid::CellGrid;
 use kernel::Slice;
 use lights::{Ground, LightPaths, Plan, sources, trace};
 use map::{Lit, PhotonMap};
 use pass::Pass;
-use segments::Refine;
+use segments::{Refine, SegmentCounts, SegmentTile};
+use settings::Estimator;
 use spatial::Changed;
+use std::any::Any;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use view::View;
 
 /// Light paths, photons, and what is known about edits since; the segments lie with their tiles.
 #[derive(Debug)]
-pub struct PhotonMapping {
-    settings: PhotonSettings,
+pub struct PhotonMapper {
+    settings: Settings,
     ground: Ground,
     lights: Vec<LightPaths>,
     /// Of the base map; `None` where photons have changed since.
@@ -60,31 +65,10 @@ pub struct PhotonMapping {
     traced: AtomicUsize,
 }
 
-impl PhotonMapping {
-    /// Prepares the paths of a scene, in parallel on the current pool; nothing is traced yet.
-    #[must_use]
-    pub fn new(scene: &Scene, settings: PhotonSettings, level: Level) -> Self {
-        let medium = &*scene.medium;
-        let reading = Reading::new(medium, settings.history_bits, settings.bins);
-        let sources = sources(scene);
-        let plan = Plan::new(scene, &settings, 0, sources.len());
-        let lights = sources.into_iter().map(|source| LightPaths::new(source, &plan)).collect();
-        Self {
-            settings,
-            ground: Ground { reading, enclosure: Enclosure::new(medium.volume().grid()), level },
-            lights,
-            map: None,
-            places: places_for(scene, &settings),
-            has_segments: false,
-            pass: None,
-            traced: AtomicUsize::new(0),
-        }
-    }
-
+impl PhotonMapper {
     /// Bytes that photons and segments take at most, but for chance: with every path as long as it may
     /// be, and a refinement pass beside the base map.
-    #[must_use]
-    pub fn most_bytes(settings: &PhotonSettings, max_scatter: u32, size: [u32; 2]) -> u64 {
+    fn most_bytes(settings: &Settings, max_scatter: u32, size: [u32; 2]) -> u64 {
         let history = u64::from(settings.history_bits).div_ceil(8);
         let photon = size_of::<paths::Photon>() as u64 + map::BYTES;
         let interactions = paths::most_kept(max_scatter) * (2 * photon + 2 * history) as f64;
@@ -93,14 +77,120 @@ impl PhotonMapping {
         crate::math::cast::whole(paths).saturating_add(segments.saturating_mul(segments::BYTES + history))
     }
 
+    /// Photons of the base map, once it is made.
+    fn photons(&self) -> usize {
+        self.lights.iter().flat_map(|light| &light.chunks).map(|chunk| chunk.photons().len()).sum()
+    }
+
+    /// Light paths.
+    fn paths(&self) -> usize {
+        self.lights.iter().map(|light| light.count as usize).sum()
+    }
+
+    /// What is kept for edits to come beside segments.
+    fn kept_paths(&self) -> [KeptCount; 3] {
+        let chunks = || self.lights.iter().flat_map(|light| &light.chunks);
+        let [paths, photons] =
+            chunks().map(chunk::Chunk::bytes).fold([0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        let count = self.photons();
+        let map = self.map.as_ref().map_or(0, PhotonMap::bytes);
+        [
+            KeptCount { name: "paths", count: self.paths(), bytes: paths },
+            KeptCount { name: "photons", count, bytes: photons },
+            KeptCount { name: "map", count, bytes: map },
+        ]
+    }
+}
+
+impl Method for PhotonMapper {
+    const NAME: &'static str = "photon";
+    const ABOUT: &'static str =
+        "Photon mapping whose photons and view rays survive edits that do not touch them.";
+
+    type Settings = Settings;
+    /// The segments of the tile's view rays, once there are any.
+    type TileState = Option<SegmentTile>;
+
+    fn check(settings: &Settings) -> Result<(), SettingProblem> {
+        match settings.history_bits {
+            32 | 64 | 128 => Ok(()),
+            bits => Err(SettingProblem {
+                key: "history_bits",
+                found: bits.to_string(),
+                expected: "32, 64 or 128",
+            }),
+        }
+    }
+
+    fn draft(settings: &Settings) -> Settings {
+        Settings {
+            photons: settings.photons.min(1 << 12),
+            segments: settings.segments.min(9),
+            steps_per_voxel: settings.steps_per_voxel.min(4.0),
+            ..*settings
+        }
+    }
+
+    fn notes(settings: &Settings, _: &Scene) -> Vec<&'static str> {
+        match settings.spatial {
+            SpatialHistory::Off => vec![
+                "with `spatial = \"off\"` edits leave light where it was: the picture is not the one from nothing",
+            ],
+            SpatialHistory::Cells | SpatialHistory::Axes => Vec::new(),
+        }
+    }
+
+    fn memory(settings: &Settings, scene: &Scene) -> Option<MemoryNeed> {
+        let max_scatter = scene.render.max_scatter;
+        Some(MemoryNeed {
+            bytes: Self::most_bytes(settings, max_scatter, scene.size),
+            key: "photons",
+            what: format!(
+                "{} light paths of up to {max_scatter} scatterings and {} segments a pixel",
+                settings.photons, settings.segments
+            ),
+            mend: "fewer of them",
+        })
+    }
+
+    /// The paths of a scene, in parallel on the current pool; nothing is traced yet.
+    fn new(scene: &Scene, settings: &Settings, resources: &Resources) -> Self {
+        let medium = &*scene.medium;
+        let reading = Reading::new(medium, settings.groups(), settings.grouping());
+        let sources = sources(scene);
+        let plan = Plan::new(scene, settings, 0, sources.len());
+        let lights = sources.into_iter().map(|source| LightPaths::new(source, &plan)).collect();
+        let enclosure = Enclosure::new(medium.volume().grid());
+        Self {
+            settings: *settings,
+            ground: Ground { reading, enclosure, level: resources.level },
+            lights,
+            map: None,
+            places: places_for(scene, settings),
+            has_segments: false,
+            pass: None,
+            traced: AtomicUsize::new(0),
+        }
+    }
+
+    fn is_touched_by(&self, difference: &Difference) -> bool {
+        // Cells decide which numbers tracking draws, and names which numbers a light's paths draw.
+        let numbers = difference.majorants || difference.seed || difference.lights.names;
+        difference.view() || difference.light() || numbers
+    }
+
+    fn update(&mut self, edit: &Edited, tiles: &mut [Option<SegmentTile>]) -> bool {
+        self.keep_valid(edit, tiles)
+    }
+
+    fn count_anew(&mut self, tiles: &mut [Option<SegmentTile>]) {
+        self.traced.store(0, Ordering::Relaxed);
+        tiles.iter_mut().flatten().for_each(|tile| tile.computed = SegmentCounts::default());
+    }
+
     /// Makes the photons ready from which a sample is to be taken, those of the base map for the first; false where a stop
     /// came before.
-    pub(super) fn prepare<'s>(
-        &mut self,
-        scene: &Scene,
-        sample: u32,
-        stop: &(impl Fn() -> Stop<'s> + Sync),
-    ) -> bool {
+    fn prepare(&mut self, scene: &Scene, sample: u32, limits: &Limits) -> bool {
         if scene.render.max_scatter == 0 {
             return true;
         }
@@ -108,12 +198,12 @@ impl PhotonMapping {
             if self.pass.as_ref().is_none_or(|pass| pass.number != sample) {
                 self.pass = Some(Pass::new(scene, &self.settings, sample));
             }
-            return self.pass.as_mut().is_some_and(|pass| pass.prepare(scene, &self.ground, stop));
+            return self.pass.as_mut().is_some_and(|pass| pass.prepare(scene, &self.ground, limits));
         }
         let off = Changed::off();
         let places = if self.has_segments { &self.places } else { &off };
         let before = self.traced.load(Ordering::Relaxed);
-        let whole = trace(&mut self.lights, scene, &self.ground, 0, places, &self.traced, stop);
+        let whole = trace(&mut self.lights, scene, &self.ground, 0, places, &self.traced, limits);
         if self.traced.load(Ordering::Relaxed) > before {
             self.map = None;
         }
@@ -127,14 +217,22 @@ impl PhotonMapping {
         true
     }
 
+    fn samples_at_once(&self) -> u32 {
+        1
+    }
+
     /// Takes the next sample of every pixel of a tile, unless a stop comes first.
-    pub(super) fn refine(
+    fn refine(
         &self,
         scene: &Scene,
         tile: &mut Tile,
         segments: &mut Option<SegmentTile>,
+        samples: u32,
         stop: &Stop,
     ) {
+        if tile.samples() >= samples {
+            return;
+        }
         let (step, gather_spacing) = (step(scene, &self.settings), self.settings.gather_spacing);
         if tile.samples() > 0 {
             let map = self.pass.as_ref().and_then(|pass| pass.map.as_ref());
@@ -152,41 +250,32 @@ impl PhotonMapping {
         level.run(Refine { view, segments, tile, groups, cells, places: &self.places, stop });
     }
 
-    /// Paths, and of these the ones traced since the last edit.
-    #[must_use]
-    pub fn paths(&self) -> [usize; 2] {
-        let all = self.lights.iter().map(|light| light.count as usize).sum();
-        [all, self.traced.load(Ordering::Relaxed)]
+    fn report(&self, tiles: &[Option<SegmentTile>], _: &PixelCounts) -> MethodReport {
+        let sum = |of: fn(&SegmentTile) -> usize| tiles.iter().flatten().map(of).sum::<usize>();
+        let (segments, bytes) = (sum(SegmentTile::len), sum(SegmentTile::bytes));
+        let computed = sum(|tile| tile.computed.segments);
+        let traced = self.traced.load(Ordering::Relaxed);
+        let segments_kept = KeptCount { name: "segments", count: segments, bytes };
+        MethodReport {
+            recomputed: vec![
+                WorkShare::new("photons", traced, self.paths()),
+                WorkShare::new("segments", computed, segments),
+            ],
+            kept: self.kept_paths().into_iter().chain([segments_kept]).collect(),
+            items_computed: Some(traced + computed),
+            counts: vec![NamedCount { name: "gathers", count: sum(|tile| tile.computed.gathers) }],
+            stages: Stages { preparation: Some("photons"), sampling: "segments" },
+        }
     }
 
-    /// Paths, as they are now.
-    pub(super) fn light_paths(&self) -> Paths {
-        Paths(self.lights.clone())
-    }
-
-    /// Begins to count the paths traced.
-    pub(super) fn count_anew(&self) {
-        self.traced.store(0, Ordering::Relaxed);
-    }
-
-    /// Photons of the base map, once it is made.
-    #[must_use]
-    pub fn photons(&self) -> usize {
-        self.lights.iter().flat_map(|light| &light.chunks).map(|chunk| chunk.photons().len()).sum()
-    }
-
-    /// Bytes kept for paths, for photons, both with their histories, and for the base map that sorts the photons.
-    #[must_use]
-    pub fn bytes(&self) -> [usize; 3] {
-        let chunks = self.lights.iter().flat_map(|light| &light.chunks).map(chunk::Chunk::bytes);
-        let [paths, photons] = chunks.fold([0; 2], |[a, b], [c, d]| [a + c, b + d]);
-        [paths, photons, self.map.as_ref().map_or(0, PhotonMap::bytes)]
+    fn kept_items(&self, tiles: &[Option<SegmentTile>]) -> Option<Box<dyn KeptItems>> {
+        Some(Box::new(KeptLight { lights: self.lights.clone(), tiles: tiles.to_vec() }))
     }
 }
 
 /// Step of a view ray, world units: so short that little light is lost in the densest matter within one, since light and
 /// view then change as fast; but not without end.
-fn step(scene: &Scene, settings: &PhotonSettings) -> f32 {
+fn step(scene: &Scene, settings: &Settings) -> f32 {
     const THICKEST: f32 = 0.5;
     const SHORTEST: f32 = 1.0 / 16.0;
     let usual = scene.medium.volume().grid().voxel_size() / settings.steps_per_voxel;
@@ -194,20 +283,20 @@ fn step(scene: &Scene, settings: &PhotonSettings) -> f32 {
 }
 
 /// The cells for photons that are gathered within a radius, in voxels.
-fn cells_for(scene: &Scene, settings: &PhotonSettings, radius: f32) -> CellGrid {
+fn cells_for(scene: &Scene, settings: &Settings, radius: f32) -> CellGrid {
     let grid = scene.medium.volume().grid();
     let radius = radius * grid.voxel_size();
-    let reach = match settings.estimate {
+    let reach = match settings.estimator() {
         // As wide as a step at least.
-        Estimate::Beam => Slice::reach_of((step(scene, settings) / radius).max(settings.gather_spacing)),
-        Estimate::Point | Estimate::Nearest(_) => 1.0,
+        Estimator::Beam => Slice::reach_of((step(scene, settings) / radius).max(settings.gather_spacing)),
+        Estimator::Point | Estimator::Nearest(_) => 1.0,
     };
     CellGrid::new(grid, radius, reach)
 }
 
 /// Where photons will change, in the map's own cells: photons are added up in the order of whole cells, so that one beside a
 /// gather moves its last bit.
-fn places_for(scene: &Scene, settings: &PhotonSettings) -> Changed {
+fn places_for(scene: &Scene, settings: &Settings) -> Changed {
     let medium = &*scene.medium;
     let grid = cells_for(scene, settings, settings.radius);
     // When so many photons have changed, few segments are left that gather none of them.
@@ -221,27 +310,46 @@ fn places_for(scene: &Scene, settings: &PhotonSettings) -> Changed {
     }
 }
 
-/// The paths of all lights at one time.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Paths(Vec<LightPaths>);
+/// Light paths and view-ray segments at one time.
+struct KeptLight {
+    lights: Vec<LightPaths>,
+    tiles: Vec<Option<SegmentTile>>,
+}
 
-impl Paths {
-    /// How many are other ones at another time, or were not there.
-    pub fn differing(&self, other: &Self) -> usize {
+impl KeptLight {
+    /// Paths that were other ones in another session's lights, or were not there.
+    fn paths_differing(&self, lights: &[LightPaths]) -> usize {
         let of_light = |light: &LightPaths| {
-            let same = other.0.iter().find(|other| other.stream == light.stream);
+            let same = lights.iter().find(|other| other.stream == light.stream);
             let chunks = light.chunks.iter().enumerate();
             let differing = chunks.map(|(i, chunk)| {
                 same.and_then(|same| same.chunks.get(i)).map_or(chunk.len(), |other| chunk.differing(other))
             });
             differing.sum::<usize>()
         };
-        self.0.iter().map(of_light).sum()
+        self.lights.iter().map(of_light).sum()
+    }
+}
+
+impl KeptItems for KeptLight {
+    fn compare(&self, other: &dyn KeptItems) -> ItemChanges {
+        let other: &dyn Any = other;
+        let (lights, tiles) =
+            other.downcast_ref::<Self>().map_or((&[][..], &[][..]), |other| (&other.lights, &other.tiles));
+        let mut changes = ItemChanges { differing: self.paths_differing(lights), new: 0 };
+        for (i, segments) in self.tiles.iter().enumerate() {
+            let Some(segments) = segments else { continue };
+            changes += match tiles.get(i) {
+                Some(Some(other)) => segments.compare(other),
+                _ => ItemChanges { differing: 0, new: segments.len() },
+            };
+        }
+        changes
     }
 }
 
 /// Sorts the photons of all lights; `radius` in voxels.
-fn sorted(scene: &Scene, radius: f32, settings: &PhotonSettings, lights: &[LightPaths]) -> PhotonMap {
+fn sorted(scene: &Scene, radius: f32, settings: &Settings, lights: &[LightPaths]) -> PhotonMap {
     let grid = scene.medium.volume().grid();
     let cells = cells_for(scene, settings, radius);
     let radius = radius * grid.voxel_size();
@@ -253,5 +361,5 @@ fn sorted(scene: &Scene, radius: f32, settings: &PhotonSettings, lights: &[Light
     };
     let lit: Vec<Lit> =
         lights.iter().map(|light| Lit { chunks: &light.chunks, scale: scale(light) }).collect();
-    PhotonMap::new(&scene.medium, cells, radius, settings.estimate, &lit)
+    PhotonMap::new(&scene.medium, cells, radius, settings.estimator(), &lit)
 }

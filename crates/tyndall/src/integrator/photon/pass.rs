@@ -2,13 +2,14 @@
 
 use super::lights::{Ground, LightPaths, Plan, sources, trace};
 use super::map::PhotonMap;
+use super::settings::{Histories, Settings};
 use super::sorted;
 use super::spatial::Changed;
 use super::view::{Stretches, View};
 use crate::film::{PixelSample, Tile};
-use crate::integrator::Stop;
+use crate::integrator::{Limits, Stop};
 use crate::sampling::Stream;
-use crate::scene::{Histories, PhotonSettings, Scene};
+use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes};
 use std::sync::atomic::AtomicUsize;
 
@@ -16,7 +17,7 @@ use std::sync::atomic::AtomicUsize;
 #[derive(Debug)]
 pub(super) struct Pass {
     pub number: u32,
-    settings: PhotonSettings,
+    settings: Settings,
     /// Voxels.
     radius: f32,
     lights: Vec<LightPaths>,
@@ -33,7 +34,7 @@ fn shrunk(pass: u32) -> f32 {
 }
 
 impl Pass {
-    pub fn new(scene: &Scene, settings: &PhotonSettings, number: u32) -> Self {
+    pub fn new(scene: &Scene, settings: &Settings, number: u32) -> Self {
         let sources = sources(scene);
         // Nothing of a pass lives through an edit.
         let plan = Plan { histories: Histories::Paths, ..Plan::new(scene, settings, number, sources.len()) };
@@ -42,17 +43,12 @@ impl Pass {
     }
 
     /// Traces and sorts the photons; false where a stop came first.
-    pub fn prepare<'s>(
-        &mut self,
-        scene: &Scene,
-        ground: &Ground,
-        stop: &(impl Fn() -> Stop<'s> + Sync),
-    ) -> bool {
+    pub fn prepare(&mut self, scene: &Scene, ground: &Ground, limits: &Limits) -> bool {
         if self.map.is_some() {
             return true;
         }
         let traced = AtomicUsize::new(0);
-        let whole = trace(&mut self.lights, scene, ground, self.number, &Changed::off(), &traced, stop);
+        let whole = trace(&mut self.lights, scene, ground, self.number, &Changed::off(), &traced, limits);
         if whole {
             self.map = Some(sorted(scene, self.radius, &self.settings, &self.lights));
             self.lights = Vec::new();

@@ -3,8 +3,8 @@
 use super::spatial::Changed;
 use super::view::{Notes, OPAQUE, Stretch, Stretches, View};
 use crate::film::{PixelSample, Tile};
-use crate::integrator::Stop;
 use crate::integrator::history::Histories;
+use crate::integrator::{ItemChanges, Stop};
 use crate::math::{Ray, Rgb, cast};
 use crate::medium::{MOST_LANES, Track};
 use crate::scene::Scene;
@@ -14,7 +14,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// The segments of a tile's pixels.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct SegmentTile {
+pub struct SegmentTile {
     /// Segments of each ray.
     per_ray: usize,
     segments: Vec<Segment>,
@@ -22,8 +22,16 @@ pub(crate) struct SegmentTile {
     histories: Histories,
     /// Values that have changed since the segments were last asked, unless there was no edit.
     changed: Option<Historygram>,
-    /// Segments computed since the last edit, and places in them where photons were gathered.
-    pub computed: [usize; 2],
+    pub(super) computed: SegmentCounts,
+}
+
+/// What was done since the last edit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct SegmentCounts {
+    /// Segments computed.
+    pub segments: usize,
+    /// Positions in them where photons were gathered.
+    pub gathers: usize,
 }
 
 /// What a segment shows. How much passes it and where it lies are as good as exact in 16 bits, its light in no less than 32.
@@ -83,7 +91,7 @@ impl SegmentTile {
             segments: vec![Segment::UNKNOWN; count],
             histories: Histories::with_len(groups, count),
             changed: None,
-            computed: [0; 2],
+            computed: SegmentCounts::default(),
         }
     }
 
@@ -97,25 +105,28 @@ impl SegmentTile {
         size_of_val(&self.segments[..]) + self.histories.bytes()
     }
 
-    /// Segments known here and there, with another light; and those known here alone.
-    pub fn differing(&self, other: &Self) -> [usize; 2] {
-        let mut counts = [0; 2];
+    /// How its known segments differ from those known at another time; with another number of segments all are new.
+    pub fn compare(&self, other: &Self) -> ItemChanges {
+        if self.len() != other.len() {
+            return ItemChanges { differing: 0, new: self.len() };
+        }
+        let mut changes = ItemChanges::default();
         for (here, there) in self.segments.iter().zip(&other.segments) {
             match [here.is_known(), there.is_known()] {
                 [true, true] => {
-                    counts[0] += usize::from(bytemuck::bytes_of(here) != bytemuck::bytes_of(there));
+                    changes.differing += usize::from(bytemuck::bytes_of(here) != bytemuck::bytes_of(there));
                 }
-                [true, false] => counts[1] += 1,
+                [true, false] => changes.new += 1,
                 _ => {}
             }
         }
-        counts
+        changes
     }
 
     /// What values an edit changed; photons may have changed anywhere.
     pub fn add_change(&mut self, values: Historygram) {
         self.changed = Some(self.changed.unwrap_or_default() | values);
-        self.computed = [0; 2];
+        self.computed = SegmentCounts::default();
     }
 
     /// Whether all changes have been asked for.
@@ -290,9 +301,9 @@ impl Kernel for Refine<'_> {
                     let steps = [stretches.from[lane], stretches.to[lane]];
                     segments.segments[numbers[lane]] = Segment::new(&found[lane], ends(steps, view.step));
                     segments.histories.set(numbers[lane], notes.read[lane]);
-                    segments.computed[1] += found[lane].gathers;
+                    segments.computed.gathers += found[lane].gathers;
                 }
-                segments.computed[0] += packet.len();
+                segments.computed.segments += packet.len();
                 if stop.reached() {
                     return;
                 }

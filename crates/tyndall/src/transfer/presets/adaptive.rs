@@ -125,7 +125,7 @@ mod tests {
         let hump = |i: i32, at: i32, n: f64| n * (-f64::from((i - at).pow(2)) / 200.0).exp();
         let count = |i| cast::index(cast::single(hump(i, 20, 9e5) + hump(i, 150, 1e5))) as u64;
         let counts = (0..256).map(count).collect();
-        let profile = Profile { histogram: Histogram { range: [0.0, 1.0], counts } };
+        let profile = Profile { histogram: &Histogram { range: [0.0, 1.0], counts } };
         let t = otsu(&profile);
         assert!((0.2..0.5).contains(&t), "{t}");
         assert!(!is_two_phase(&profile));
@@ -135,7 +135,7 @@ mod tests {
     fn two_values_are_parted_in_the_middle() {
         let mut counts = vec![0; 256];
         (counts[0], counts[255]) = (500, 500);
-        let profile = Profile { histogram: Histogram { range: [0.0, 1.0], counts } };
+        let profile = Profile { histogram: &Histogram { range: [0.0, 1.0], counts } };
         assert!((otsu(&profile) - 0.5).abs() < 0.01);
         assert!(is_two_phase(&profile));
     }

@@ -87,16 +87,13 @@ impl Preset {
 }
 
 /// What a preset knows of a volume.
-struct Profile {
-    histogram: Histogram,
+struct Profile<'a> {
+    histogram: &'a Histogram,
 }
 
-/// Fine enough to place a threshold, coarse enough for every bin to mean something.
-const BINS: usize = 256;
-
-impl Profile {
-    fn new(volume: &Volume) -> Self {
-        Self { histogram: volume.histogram(volume.robust_range(), BINS) }
+impl<'a> Profile<'a> {
+    fn new(volume: &'a Volume) -> Self {
+        Self { histogram: volume.robust_histogram() }
     }
 
     /// The value at a share of the robust range.

@@ -1,0 +1,198 @@
+//! Everything that a scene document names: its volume and its environment maps.
+
+use crate::document::{self, Document};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tyndall::light::{Map, MapError};
+use tyndall::message::place;
+use tyndall::volume::procedural::{Field, Kind};
+use tyndall::volume::{Bricks, GridError, Interpolation, Volume};
+use tyndall_formats::image::{ImageError, read_map};
+use tyndall_formats::volume::{Endian, RawLayout, ReadError, SampleType, read, read_raw};
+
+/// What a document names but does not hold.
+#[derive(Clone, Debug)]
+pub struct Assets {
+    /// The volume, read as the document says.
+    pub volume: Arc<Volume>,
+    /// Environment maps by the path that the document gives.
+    pub maps: BTreeMap<String, Arc<Map>>,
+}
+
+impl Assets {
+    /// Whether both have the very same maps.
+    pub(crate) fn shares_maps(&self, other: &Self) -> bool {
+        let same = |(path, map)| other.maps.get(path).is_some_and(|other| Arc::ptr_eq(map, other));
+        self.maps.len() == other.maps.len() && self.maps.iter().all(same)
+    }
+}
+
+/// What a volume's source said beside the volume.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Source {
+    /// Components per voxel in the file.
+    pub channels: usize,
+    /// Time steps in the file.
+    pub times: usize,
+    /// What a user should know.
+    pub notes: Vec<String>,
+}
+
+/// Why an asset could not be had.
+#[derive(Debug, thiserror::Error)]
+pub enum AssetError {
+    /// The volume's file.
+    #[error(transparent)]
+    Volume(#[from] ReadError),
+    /// The procedural field.
+    #[error("`volume.procedural.size`: {0}")]
+    Field(#[from] GridError),
+    /// The memory that a procedural field would take.
+    #[error("`volume.procedural.size`: {dims:?} voxels need {} MiB, but {} MiB are free; expected a smaller field", .needed >> 20, .available >> 20)]
+    Memory {
+        /// Voxels along each axis.
+        dims: [usize; 3],
+        /// Bytes.
+        needed: u64,
+        /// Bytes.
+        available: u64,
+    },
+    /// An environment map's file.
+    #[error("`lights.{light}.map`: {source}")]
+    MapFile {
+        /// Number of the light.
+        light: usize,
+        /// Why.
+        source: ImageError,
+    },
+    /// An environment map's content.
+    #[error("`lights.{light}.map`: {}: {source}", place(.path))]
+    Map {
+        /// Number of the light.
+        light: usize,
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: MapError,
+    },
+}
+
+/// Reads what a document names; its paths start from `folder`. In parallel on the current thread pool.
+///
+/// # Errors
+/// [`AssetError`] names the file or key.
+pub fn load(document: &Document, folder: &Path) -> Result<(Assets, Source), AssetError> {
+    let (volume, source) = volume(&document.volume, folder)?;
+    let volume = Arc::new(volume.with_interpolation(interpolation(document)));
+    let maps = maps(document, folder, &BTreeMap::new())?;
+    Ok((Assets { volume, maps }, source))
+}
+
+/// Reads what a document names that the one before an edit did not; the rest is shared with that one's assets.
+///
+/// # Errors
+/// [`AssetError`] names the file or key.
+pub fn reload(
+    document: &Document,
+    folder: &Path,
+    before: (&Document, &Assets),
+) -> Result<Assets, AssetError> {
+    let (old, assets) = before;
+    let interpolation = interpolation(document);
+    let same = document::Volume { interpolation: old.volume.interpolation, ..document.volume.clone() };
+    let volume = if same != old.volume {
+        Arc::new(volume(&document.volume, folder)?.0.with_interpolation(interpolation))
+    } else if assets.volume.interpolation() == interpolation {
+        assets.volume.clone()
+    } else {
+        Arc::new((*assets.volume).clone().with_interpolation(interpolation))
+    };
+    Ok(Assets { volume, maps: maps(document, folder, &assets.maps)? })
+}
+
+fn interpolation(document: &Document) -> Interpolation {
+    match document.volume.interpolation {
+        document::Interpolation::Linear => Interpolation::Linear,
+        document::Interpolation::Nearest => Interpolation::Nearest,
+    }
+}
+
+/// The environment maps of a document, by the paths that it gives; those that are known are not read again.
+fn maps(
+    document: &Document,
+    folder: &Path,
+    known: &BTreeMap<String, Arc<Map>>,
+) -> Result<BTreeMap<String, Arc<Map>>, AssetError> {
+    let mut maps = BTreeMap::new();
+    for (light, l) in document.lights.iter().flatten().enumerate() {
+        let document::Light::Environment { map: Some(name), .. } = l else { continue };
+        if let Some(map) = known.get(name) {
+            maps.insert(name.clone(), map.clone());
+        }
+        if !maps.contains_key(name) {
+            let path = folder.join(name);
+            let picture = read_map(&path).map_err(|source| AssetError::MapFile { light, source })?;
+            let map = Map::new(picture.width, picture.height, picture.pixels)
+                .map_err(|source| AssetError::Map { light, path, source })?;
+            maps.insert(name.clone(), Arc::new(map));
+        }
+    }
+    Ok(maps)
+}
+
+fn volume(described: &document::Volume, folder: &Path) -> Result<(Volume, Source), AssetError> {
+    if let Some(procedural) = &described.procedural {
+        return field(procedural);
+    }
+    // The document's own check demands one of both.
+    let path = folder.join(described.path.as_deref().unwrap_or_default());
+    let loaded = match &described.raw {
+        Some(raw) => read_raw(&path, &layout(raw)),
+        None => read(&path),
+    }?;
+    let source = Source { channels: loaded.channels, times: loaded.times, notes: loaded.notes };
+    Ok((loaded.volume, source))
+}
+
+fn field(described: &document::Procedural) -> Result<(Volume, Source), AssetError> {
+    let kind = match described.kind {
+        document::FieldKind::Constant => Kind::Constant,
+        document::FieldKind::Sphere => Kind::Sphere,
+        document::FieldKind::Shells => Kind::Shells,
+        document::FieldKind::MarschnerLobb => Kind::MarschnerLobb,
+        document::FieldKind::Cloud => Kind::Cloud,
+        document::FieldKind::CornellBox => Kind::CornellBox,
+    };
+    let dims = described.size.map(|n| n as usize);
+    let linear = dims.iter().fold(4_u64, |bytes, &n| bytes.saturating_mul(n as u64));
+    let needed = linear.saturating_add(Bricks::bytes(dims, 4).unwrap_or(u64::MAX));
+    if let Some(available) = tyndall_formats::memory::available().filter(|&available| needed > available) {
+        return Err(AssetError::Memory { dims, needed, available });
+    }
+    let volume = Field::new(kind, dims, described.seed).volume()?;
+    Ok((volume, Source { channels: 1, times: 1, notes: Vec::new() }))
+}
+
+fn layout(raw: &document::Raw) -> RawLayout {
+    RawLayout {
+        dims: raw.dims.map(|n| n as usize),
+        dtype: match raw.dtype {
+            document::DataType::U8 => SampleType::U8,
+            document::DataType::I8 => SampleType::I8,
+            document::DataType::U16 => SampleType::U16,
+            document::DataType::I16 => SampleType::I16,
+            document::DataType::U32 => SampleType::U32,
+            document::DataType::I32 => SampleType::I32,
+            document::DataType::F32 => SampleType::F32,
+            document::DataType::F64 => SampleType::F64,
+        },
+        endian: match raw.endian {
+            document::Endian::Little => Endian::Little,
+            document::Endian::Big => Endian::Big,
+        },
+        offset: raw.offset,
+        spacing: raw.spacing,
+        origin: raw.origin,
+    }
+}

@@ -1,0 +1,325 @@
+//! From the checked document to the scene: what was left to choice is chosen here, by the volume.
+
+use crate::assets::Assets;
+use crate::document::{self, Document};
+use std::fmt::Display;
+use std::sync::Arc;
+use tyndall::camera::{AutoView, Camera, FitLens, Lens, fit};
+use tyndall::light::{
+    Directional, Disk, Emission, Environment, Light, LightSet, PointLight, Rect, SphereLight,
+};
+use tyndall::math::{Bounds, Frame, Rgb, Vec3, cast};
+use tyndall::medium::{ClipShape, Medium, MediumSettings};
+use tyndall::message::excerpt;
+use tyndall::scattering::{Abc, Brdf, HenyeyGreenstein, Phase, Schlick};
+use tyndall::scene::{Background, RenderSettings, Scene};
+use tyndall::transfer::{Optics, PRESETS, Point, Preset, TransferFunction};
+use tyndall::volume::{Space, Volume};
+
+/// Why a document with its assets makes no scene.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("`{path}`: {problem}")]
+pub struct SceneError {
+    /// Where in the document.
+    pub path: String,
+    /// What was found, what was expected, and the mend.
+    pub problem: String,
+}
+
+/// Optical thickness of a voxel beyond which single precision no longer tells collisions apart.
+const DENSEST: f32 = 1000.0;
+
+/// Places beyond this leave no room for single precision.
+const FARTHEST: f32 = 1e18;
+
+fn fault(path: impl Into<String>, problem: impl Display) -> SceneError {
+    SceneError { path: path.into(), problem: problem.to_string() }
+}
+
+/// What a scene was built from, beside the scene: edited scenes share all that an edit left alone.
+#[derive(Clone, Debug)]
+pub struct Built {
+    /// The document.
+    pub document: Document,
+    /// What it names.
+    pub assets: Assets,
+    /// The scene.
+    pub scene: Scene,
+}
+
+impl Built {
+    /// Builds the scene of a document, in parallel on the current thread pool.
+    ///
+    /// # Errors
+    /// [`SceneError`] for what only shows beside the volume: a preset that is not there, a view
+    /// without a frame, a map that was not given.
+    pub fn new(document: Document, assets: Assets) -> Result<Self, SceneError> {
+        let scene = build(&document, &assets, None)?;
+        Ok(Self { document, assets, scene })
+    }
+
+    /// The same of an edited document. What the edit left alone is shared, so that an edit costs what it touches; the scene
+    /// equals that of [`Self::new`] to the last bit.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn edited(&self, document: Document, assets: Assets) -> Result<Self, SceneError> {
+        let scene = build(&document, &assets, Some(self))?;
+        Ok(Self { document, assets, scene })
+    }
+}
+
+fn build(document: &Document, assets: &Assets, before: Option<&Built>) -> Result<Scene, SceneError> {
+    let volume = &assets.volume;
+    let same_volume = before.filter(|before| Arc::ptr_eq(&before.assets.volume, volume));
+    let medium = medium(document, volume, same_volume)?;
+    Ok(Scene {
+        light_names: light_names(document, volume),
+        lights: lights(document, assets, &medium, same_volume)?,
+        medium,
+        camera: camera(document, volume)?,
+        size: document.film.size,
+        background: background(document),
+        render: RenderSettings {
+            method: document.render.method().clone(),
+            max_scatter: document.render.max_scatter,
+            seed: document.render.seed,
+        },
+    })
+}
+
+/// The medium, shared with the scene before an edit as far as that left it alone.
+fn medium(
+    document: &Document,
+    volume: &Arc<Volume>,
+    before: Option<&Built>,
+) -> Result<Arc<Medium>, SceneError> {
+    let same_transfer = before.filter(|b| b.document.transfer_function == document.transfer_function);
+    let same =
+        same_transfer.filter(|b| b.document.medium == document.medium && b.document.clip == document.clip);
+    if let Some(before) = same {
+        return Ok(before.scene.medium.clone());
+    }
+    let thinnest = volume.grid().spacing().into_iter().fold(f64::INFINITY, f64::min);
+    let per_voxel = document.medium.density * cast::single(thinnest);
+    if per_voxel > DENSEST {
+        let problem = format!(
+            "{} makes an optical thickness of {per_voxel:e} per voxel; expected at most {DENSEST}, which \
+             is opaque within a thousandth of a voxel: lower the density or give the true spacing",
+            document.medium.density
+        );
+        return Err(fault("medium.density", problem));
+    }
+    let transfer = match same_transfer {
+        Some(before) => before.scene.medium.shared_transfer().clone(),
+        None => Arc::new(transfer(document, volume)?),
+    };
+    let settings = medium_settings(document)?;
+    let old = before.map(|before| &*before.scene.medium);
+    Ok(Arc::new(Medium::after(old, volume.clone(), transfer, &settings)))
+}
+
+/// The lights and the glowing matter, shared with the scene before an edit as far as that left them alone.
+fn lights(
+    document: &Document,
+    assets: &Assets,
+    medium: &Medium,
+    before: Option<&Built>,
+) -> Result<Arc<LightSet>, SceneError> {
+    let same_lights = before.filter(|b| b.document.lights == document.lights && b.assets.shares_maps(assets));
+    let same_matter = before.filter(|b| b.scene.medium.shares_matter(medium));
+    if let (Some(before), Some(_)) = (same_lights, same_matter)
+        && before.scene.medium.density().to_bits() == medium.density().to_bits()
+    {
+        return Ok(before.scene.lights.clone());
+    }
+    let lights = match (same_lights, &document.lights) {
+        (Some(before), _) => before.scene.lights.lights().to_vec(),
+        (None, None) => default_lights(medium.volume().grid().space()),
+        (None, Some(lights)) => {
+            let up = medium.volume().grid().space().up();
+            let read = |(i, l)| light(l, up, assets).map_err(|e| fault(format!("lights.{i}"), e));
+            lights.iter().enumerate().map(read).collect::<Result<_, _>>()?
+        }
+    };
+    let emission = Emission::after(same_matter.and_then(|b| b.scene.lights.emission()), medium);
+    Ok(Arc::new(LightSet::with_emission(lights, medium, emission)))
+}
+
+fn light_names(document: &Document, volume: &Volume) -> Vec<Option<String>> {
+    match &document.lights {
+        None => vec![None; default_lights(volume.grid().space()).len()],
+        Some(lights) => lights.iter().map(|light| light.name().map(str::to_owned)).collect(),
+    }
+}
+
+fn transfer(document: &Document, volume: &Volume) -> Result<TransferFunction, SceneError> {
+    let given = document.transfer_function.as_ref();
+    let points = if let Some(points) = given.and_then(|t| t.points.as_ref()) {
+        points.iter().map(point).collect()
+    } else if let Some(name) = given.and_then(|t| t.preset.as_ref()) {
+        let preset = Preset::named(name).ok_or_else(|| {
+            let known = PRESETS.map(|p| p.name).join(", ");
+            fault("transfer_function.preset", format!("no preset `{}`; there are {known}", excerpt(name)))
+        })?;
+        preset.points(volume)
+    } else {
+        Preset::for_volume(volume).points(volume)
+    };
+    TransferFunction::over(volume.value_bins(), points).map_err(|e| fault("transfer_function.points", e))
+}
+
+fn point(p: &document::TransferPoint) -> Point {
+    let optics = Optics {
+        opacity: p.opacity,
+        albedo: p.albedo.into(),
+        emission: p.emission.into(),
+        surface: p.surface,
+        specular: p.specular.into(),
+        roughness: p.roughness,
+        ior: p.ior,
+    };
+    Point { value: p.value, optics }
+}
+
+fn medium_settings(document: &Document) -> Result<MediumSettings, SceneError> {
+    let phase = match document.medium.phase {
+        document::Phase::Isotropic => Phase::Isotropic,
+        document::Phase::HenyeyGreenstein { g } => {
+            Phase::HenyeyGreenstein(HenyeyGreenstein::new(g).map_err(|e| fault("medium.phase.g", e))?)
+        }
+        document::Phase::Schlick { k } => {
+            Phase::Schlick(Schlick::new(k).map_err(|e| fault("medium.phase.k", e))?)
+        }
+    };
+    let brdf = match document.medium.brdf {
+        document::Brdf::Lambert => Brdf::Lambert,
+        document::Brdf::AshikhminShirley => Brdf::AshikhminShirley,
+        document::Brdf::Abc { b, c } => Brdf::Abc(Abc::new(b, c).map_err(|e| fault("medium.brdf", e))?),
+    };
+    let clip = document.clip.iter().map(|clip| match *clip {
+        document::Clip::Plane { point, normal, .. } => {
+            ClipShape::Plane { point: point.into(), normal: normal.into() }
+        }
+        document::Clip::Box { min, max, .. } => ClipShape::Box(Bounds::new(min.into(), max.into())),
+    });
+    Ok(MediumSettings {
+        density: document.medium.density,
+        phase,
+        brdf,
+        gradient_factor: document.medium.gradient_factor,
+        clip: clip.collect(),
+        majorant_cell: document.medium.majorant_cell as usize,
+    })
+}
+
+fn light(light: &document::Light, world_up: Vec3, assets: &Assets) -> Result<Light, String> {
+    let vector = Vec3::from_array;
+    Ok(match light {
+        document::Light::Directional { direction, irradiance, angle, .. } => {
+            Light::Directional(Directional::new(vector(*direction), Rgb::from(*irradiance), *angle))
+        }
+        document::Light::Point { position, intensity, .. } => {
+            Light::Point(PointLight { position: vector(*position), intensity: Rgb::from(*intensity) })
+        }
+        document::Light::Rect { position, target, up, size, radiance, .. } => {
+            let facing = vector(*target) - vector(*position);
+            let up = up.map_or(world_up, vector);
+            Light::Rect(Rect::new(vector(*position), facing, up, *size, Rgb::from(*radiance)))
+        }
+        document::Light::Disk { position, target, radius, radiance, .. } => {
+            let facing = vector(*target) - vector(*position);
+            Light::Disk(Disk::new(vector(*position), facing, *radius, Rgb::from(*radiance)))
+        }
+        document::Light::Sphere { position, radius, radiance, .. } => Light::Sphere(SphereLight {
+            middle: vector(*position),
+            radius: *radius,
+            radiance: Rgb::from(*radiance),
+        }),
+        document::Light::Environment { radiance, map, rotation, visible, .. } => {
+            Light::Environment(match (radiance, map) {
+                (_, Some(path)) => {
+                    let map = assets
+                        .maps
+                        .get(path)
+                        .ok_or_else(|| format!("the map `{}` is missing", excerpt(path)))?;
+                    Environment::map(map.clone(), world_up, *rotation, *visible)
+                }
+                (radiance, None) => Environment::constant(radiance.map_or(Rgb::BLACK, Rgb::from), *visible),
+            })
+        }
+    })
+}
+
+/// Lights that show form: a warm soft sun from the upper left of the front, a cool sky that fills.
+fn default_lights(space: Space) -> Vec<Light> {
+    let (up, front) = match space {
+        Space::Anatomical => (Vec3::Z, -Vec3::Y),
+        Space::Plain => (Vec3::Y, Vec3::Z),
+    };
+    let right = up.cross(front);
+    let travel = right * 0.7 - up * 0.8 - front * 0.6;
+    let sun = Directional::new(travel, Rgb::new(5.0, 4.7, 4.2), 12.0);
+    let sky = Environment::constant(Rgb::new(0.22, 0.25, 0.30), true);
+    vec![Light::Directional(sun), Light::Environment(sky)]
+}
+
+fn camera(document: &Document, volume: &Volume) -> Result<Camera, SceneError> {
+    let grid = volume.grid();
+    let given = document.camera.clone().unwrap_or_default();
+    let up = given.up().map(Vec3::from_array);
+    let Some(position) = given.position().map(Vec3::from_array) else {
+        let auto = given.auto();
+        let usual = AutoView::default_for(grid.space());
+        let view = AutoView {
+            azimuth: auto.azimuth.unwrap_or(usual.azimuth),
+            elevation: auto.elevation.unwrap_or(usual.elevation),
+            zoom: auto.zoom,
+        };
+        let lens = match given {
+            document::Camera::Perspective { fov, aperture, focus, .. } => {
+                FitLens::Perspective { fov, aperture, focus }
+            }
+            document::Camera::Orthographic { height, .. } => FitLens::Orthographic { height },
+        };
+        let camera = fit(grid, view, up, lens, document.film.size);
+        let place = camera.position();
+        if !place.is_finite() || place.length() > FARTHEST {
+            let problem = format!("the volume fits from {place} only; expected a wider field of view");
+            return Err(fault("camera.fov", problem));
+        }
+        return Ok(camera);
+    };
+    let target = given.target().map_or_else(|| grid.world_bounds().center(), Vec3::from_array);
+    let view = target - position;
+    if view.length() <= 1e-6 * (1.0 + position.length()) {
+        let problem = format!("{position} is the target; expected two places: move one of them");
+        return Err(fault("camera.position", problem));
+    }
+    let up = up.unwrap_or_else(|| {
+        let up = grid.space().up();
+        // Looking straight along the world's up, any upright picture will do.
+        if up.cross(view).length() > 1e-3 * view.length() { up } else { Frame::around(up).v }
+    });
+    if up.cross(view).length() <= 1e-6 * up.length() * view.length() {
+        let problem = format!("{up} lies along the view {view}; expected another direction");
+        return Err(fault("camera.up", problem));
+    }
+    let lens = match given {
+        document::Camera::Perspective { fov, aperture, focus, .. } => {
+            Lens::Perspective { fov, aperture, focus: focus.unwrap_or_else(|| view.length()) }
+        }
+        document::Camera::Orthographic { height, .. } => {
+            Lens::Orthographic { height: height.unwrap_or_else(|| grid.diagonal()) }
+        }
+    };
+    Ok(Camera::new(position, target, up, lens))
+}
+
+fn background(document: &Document) -> Background {
+    match document.film.background {
+        document::Background::Environment => Background::Environment,
+        document::Background::Transparent => Background::Transparent,
+        document::Background::Color(color) => Background::Color(color.into()),
+    }
+}

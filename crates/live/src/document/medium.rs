@@ -1,0 +1,98 @@
+//! The medium: how dense the matter is, and how it turns light.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::shape::{MajorantCell, MeanCosine, NonNegative};
+
+/// What the whole volume shares: the scale of its extinction, and how it scatters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Medium {
+    /// Extinction per world unit where the transfer function's opacity is 1.
+    #[schemars(with = "NonNegative")]
+    pub density: f32,
+
+    /// Phase function of matter that scatters as a cloud.
+    pub phase: Phase,
+
+    /// Reflectance function of matter that scatters as a surface.
+    pub brdf: Brdf,
+
+    /// How soon a gradient makes a surface: the probability of one is
+    /// `surface * (1 - exp(-gradient_factor * |grad v| * h / range))`, h the voxel's edge and range the robust data range.
+    #[schemars(with = "NonNegative")]
+    pub gradient_factor: f32,
+
+    /// Edge, in voxels, of the cells that each keep their own majorant of the extinction; 0 is one majorant for the whole
+    /// volume. It changes the speed, never the expected picture.
+    #[schemars(with = "MajorantCell")]
+    pub majorant_cell: u32,
+}
+
+impl Default for Medium {
+    fn default() -> Self {
+        Self {
+            density: 1.0,
+            phase: Phase::default(),
+            brdf: Brdf::default(),
+            gradient_factor: 10.0,
+            majorant_cell: 8,
+        }
+    }
+}
+
+/// Phase function: the density over solid angle into which a cloud turns light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
+#[schemars(extend("default" = { "type": "isotropic" }))]
+pub enum Phase {
+    /// The same into all directions.
+    #[default]
+    Isotropic,
+    /// One lobe, set by its mean cosine.
+    HenyeyGreenstein {
+        /// Mean cosine of the angle of deflection, between -1 and 1; positive is forward.
+        #[serde(default)]
+        #[schemars(with = "MeanCosine")]
+        g: f32,
+    },
+    /// Schlick's lobe, `(1 - k^2) / (4 pi (1 - k cos)^2)`: close to Henyey-Greenstein, and cheaper.
+    Schlick {
+        /// Shape of the lobe, between -1 and 1; positive is forward.
+        #[serde(default)]
+        #[schemars(with = "MeanCosine")]
+        k: f32,
+    },
+}
+
+/// Reflectance function of surfaces inside the volume; albedo, specular and roughness come from the transfer function.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
+#[schemars(extend("default" = { "type": "lambert" }))]
+pub enum Brdf {
+    /// Matt: albedo / pi.
+    #[default]
+    Lambert,
+    /// The model of Ashikhmin and Shirley with both exponents `2 / roughness^4 - 2`.
+    AshikhminShirley,
+    /// The two-parameter ABC model of measured, glossy materials.
+    Abc {
+        /// Width of the lobe: the larger, the sharper.
+        #[serde(default = "default_width")]
+        #[schemars(with = "NonNegative")]
+        b: f32,
+        /// Fall-off of the lobe's tail.
+        #[serde(default = "default_fall_off")]
+        #[schemars(with = "NonNegative")]
+        c: f32,
+    },
+}
+
+fn default_width() -> f32 {
+    100.0
+}
+
+fn default_fall_off() -> f32 {
+    1.0
+}

@@ -1,0 +1,50 @@
+//! Scene documents, and the live session that edits them: what the program, a viewer and a script stand on.
+//!
+//! A program that renders a file:
+//! ```no_run
+//! use std::path::Path;
+//! use tyndall_live::{Budget, LiveSession, Options};
+//!
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     let mut live = LiveSession::open(Path::new("head.nii.gz"), Options::new()?)?;
+//!     live.refine(&Budget::samples(16));
+//!     let picture = live.image();
+//!     println!("{:?}: {:?}", picture.size, picture.rgba[0]);
+//!     Ok(())
+//! }
+//! ```
+//! And one that edits: only the light that the edit touched is computed again.
+//! ```
+//! use serde_json::json;
+//! use std::path::Path;
+//! use tyndall_live::{Budget, Input, LiveSession, Options};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scene = json!({ "volume": { "procedural": { "kind": "cloud", "size": [16, 16, 16] } }, "film": { "size": [32, 32] } });
+//! let mut live = LiveSession::start(Input::of_document(scene, Path::new("")), Options::new()?)?;
+//! live.refine(&Budget::samples(4));
+//! live.edit(&json!({ "medium": { "density": 0.3 } }))?;
+//! live.refine(&Budget::samples(4));
+//! live.undo()?;
+//! # assert_eq!(live.document().medium.density, 1.0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! The crate knows files (through `tyndall-formats`) and the renderer (`tyndall`), but no window, server, command line or Python.
+
+mod admission;
+pub mod assets;
+mod build;
+pub mod document;
+mod error;
+mod input;
+mod session;
+mod undo;
+
+pub use assets::{Assets, Source};
+pub use build::{Built, SceneError};
+pub use error::LiveError;
+pub use input::{Input, Loaded, read_text};
+pub use session::{EditReport, LiveSession, Options};
+pub use tyndall::session::{Budget, Progress};

@@ -1,0 +1,284 @@
+//! The live session: a document, what it names, its scene, and the light computed so far, under edits.
+
+use crate::admission;
+use crate::assets::{self, Assets, Source};
+use crate::build::Built;
+use crate::document::{self, Document};
+use crate::error::LiveError;
+use crate::input::{Input, Loaded, of_assets};
+use crate::undo::UndoList;
+use serde_json::Value;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tyndall::film::{Film, Image};
+use tyndall::integrator::{MethodReport, Resources, method_of};
+use tyndall::scene::{Difference, Scene};
+use tyndall::session::{Budget, Progress, Session};
+use tyndall::simd::Level;
+
+/// What a live session runs on.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Threads that load, build and render.
+    pub threads: Arc<rayon::ThreadPool>,
+    /// Vector instructions.
+    pub level: Level,
+    /// Whether edits are to come, so that it pays to keep what makes them fast.
+    pub edits: bool,
+}
+
+impl Options {
+    /// A thread for each processor, the widest vector instructions, ready for edits.
+    ///
+    /// # Errors
+    /// If the system gives no threads.
+    pub fn new() -> Result<Self, rayon::ThreadPoolBuildError> {
+        let threads = Arc::new(rayon::ThreadPoolBuilder::new().build()?);
+        Ok(Self { threads, level: Level::best(), edits: true })
+    }
+}
+
+/// A scene under edit, shown as it gets better.
+///
+/// An edit is a JSON Merge Patch on the scene document. It redoes only the light that it touched, and the picture comes to that
+/// of a session opened with the edited document, bit for bit. An edit that fails changes nothing.
+pub struct LiveSession {
+    /// Folder that the document's paths start from.
+    folder: PathBuf,
+    /// The document as written and edited; null where no edits were expected.
+    value: Value,
+    built: Built,
+    session: Session,
+    undo: UndoList,
+    options: Options,
+    source: Source,
+    /// What the user should know of the present scene.
+    notes: Vec<String>,
+}
+
+/// What an edit did.
+#[derive(Clone, Debug)]
+pub struct EditReport {
+    /// What of the scene changed.
+    pub difference: Difference,
+    /// What a user should know of the scene now that was not so before, a sentence each.
+    pub notes: Vec<String>,
+}
+
+impl LiveSession {
+    /// Opens a file: a scene, a picture that carries one, or a volume, whose look is then chosen for it.
+    ///
+    /// # Errors
+    /// [`LiveError`] with what is wrong with the file or with what it names, or that there is too little memory.
+    pub fn open(path: &Path, options: Options) -> Result<Self, LiveError> {
+        Self::start(Input::open(path)?, options)
+    }
+
+    /// Opens an input, which may have been patched.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn start(input: Input, options: Options) -> Result<Self, LiveError> {
+        Self::of(input.load(&options)?, options)
+    }
+
+    /// Starts on what was loaded with the same options.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn of(loaded: Loaded, options: Options) -> Result<Self, LiveError> {
+        let Loaded { document, assets, source, value, folder, name: at, notes: told } = loaded;
+        let built = Self::build(document, assets, &options, &at)?;
+        let session = session_of(&built.scene, &options);
+        let of_source = source.notes.iter().cloned();
+        let notes = told.into_iter().chain(of_source).chain(notes_of(&built.scene)).collect();
+        Ok(Self { folder, value, built, session, undo: UndoList::default(), options, source, notes })
+    }
+
+    /// Builds a scene from nothing, if there is memory for it.
+    fn build(document: Document, assets: Assets, options: &Options, at: &str) -> Result<Built, LiveError> {
+        admission::film(&document, at)?;
+        let built = options
+            .threads
+            .install(|| Built::new(document, assets))
+            .map_err(|source| LiveError::Scene { at: at.to_owned(), source })?;
+        admission::method(&built.scene, at)?;
+        Ok(built)
+    }
+
+    /// A session of the same document with no light computed yet, which shares the voxels: built through the parser, as if
+    /// the document were opened anew.
+    ///
+    /// # Errors
+    /// [`LiveError`] if there is too little memory for another one.
+    pub fn fresh(&self) -> Result<Self, LiveError> {
+        let at = "scene";
+        let (document, assets) = self.parse(self.value().into_owned(), at)?;
+        let built = Self::build(document, assets, &self.options, at)?;
+        Ok(Self {
+            folder: self.folder.clone(),
+            value: self.value().into_owned(),
+            session: session_of(&built.scene, &self.options),
+            built,
+            undo: UndoList::default(),
+            options: self.options.clone(),
+            source: self.source.clone(),
+            notes: self.notes.clone(),
+        })
+    }
+
+    /// Applies a merge patch to the document, and goes on with the edited scene.
+    ///
+    /// # Errors
+    /// [`LiveError`] with what is wrong with the patched document; the session then is as it was.
+    pub fn edit(&mut self, patch: &Value) -> Result<EditReport, LiveError> {
+        self.edit_at(patch, "edit")
+    }
+
+    /// [`Self::edit`], whose errors begin with `at`, which says where the patch comes from.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn edit_at(&mut self, patch: &Value, at: &str) -> Result<EditReport, LiveError> {
+        let mut patch = patch.clone();
+        let moved = document::move_old_keys(&mut patch)
+            .map_err(|source| LiveError::Document { at: at.to_owned(), source })?;
+        let before = self.value().into_owned();
+        let after = document::apply(&before, &patch);
+        let mut report = self.go_to(after, at)?;
+        self.undo.remember(&before, &self.value);
+        report.notes.splice(0..0, moved);
+        Ok(report)
+    }
+
+    /// Takes back the last edit that was not taken back yet, but for the camera, which stays where it is; `None` where there
+    /// is none.
+    ///
+    /// # Errors
+    /// [`LiveError`], as where a file is gone that the document named then; the session then is as it was.
+    pub fn undo(&mut self) -> Result<Option<EditReport>, LiveError> {
+        let Some(before) = self.undo.before(&self.value) else { return Ok(None) };
+        let report = self.go_to(before, "undo")?;
+        self.undo.undone();
+        Ok(Some(report))
+    }
+
+    /// Does again what [`Self::undo`] took back last; `None` where there is nothing, or an edit came since.
+    ///
+    /// # Errors
+    /// As [`Self::undo`].
+    pub fn redo(&mut self) -> Result<Option<EditReport>, LiveError> {
+        let Some(after) = self.undo.after(&self.value) else { return Ok(None) };
+        let report = self.go_to(after, "redo")?;
+        self.undo.redone();
+        Ok(Some(report))
+    }
+
+    /// Goes on with another document; nothing changes before all of it has been found sound.
+    fn go_to(&mut self, value: Value, at: &str) -> Result<EditReport, LiveError> {
+        let (document, assets) = self.parse(value.clone(), at)?;
+        admission::film(&document, at)?;
+        let built = self
+            .options
+            .threads
+            .install(|| self.built.edited(document, assets))
+            .map_err(|source| LiveError::Scene { at: at.to_owned(), source })?;
+        admission::method(&built.scene, at)?;
+        let difference = self.session.set_scene(built.scene.clone());
+        let known = notes_of(&self.built.scene);
+        let notes = notes_of(&built.scene).into_iter().filter(|note| !known.contains(note)).collect();
+        (self.value, self.built) = (value, built);
+        Ok(EditReport { difference, notes })
+    }
+
+    /// The document of a value, with what it names; what the present document names too is shared with it.
+    fn parse(&self, value: Value, at: &str) -> Result<(Document, Assets), LiveError> {
+        let document = Document::from_value(value)
+            .map_err(|source| LiveError::Document { at: at.to_owned(), source })?;
+        let before = (&self.built.document, &self.built.assets);
+        let assets = self
+            .options
+            .threads
+            .install(|| assets::reload(&document, &self.folder, before))
+            .map_err(|error| of_assets(error, at))?;
+        Ok((document, assets))
+    }
+
+    /// Works until the budget is spent, see [`Session::refine`].
+    pub fn refine(&mut self, budget: &Budget) -> Progress {
+        self.session.refine(budget)
+    }
+
+    /// The picture so far.
+    #[must_use]
+    pub fn image(&self) -> Image {
+        self.session.image()
+    }
+
+    /// The film so far.
+    #[must_use]
+    pub fn film(&self) -> &Film {
+        self.session.film()
+    }
+
+    /// The scene that is rendered.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        self.session.scene()
+    }
+
+    /// The document, with every default filled in.
+    #[must_use]
+    pub fn document(&self) -> &Document {
+        &self.built.document
+    }
+
+    /// The document as it was written and edited, without defaults as long as edits were expected.
+    #[must_use]
+    pub fn value(&self) -> Cow<'_, Value> {
+        if self.value.is_null() { Cow::Owned(self.document().to_value()) } else { Cow::Borrowed(&self.value) }
+    }
+
+    /// The folder that the document's paths start from.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What the volume's source said beside the volume.
+    #[must_use]
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// What a user should know of the scene as it was opened, a sentence each.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// The session of the renderer, for what it counts.
+    #[must_use]
+    pub fn session(&self) -> &Session {
+        &self.session
+    }
+
+    /// What was computed since the last edit, or since the beginning, and what is kept for edits to come.
+    #[must_use]
+    pub fn report(&self) -> MethodReport {
+        self.session.report()
+    }
+}
+
+fn session_of(scene: &Scene, options: &Options) -> Session {
+    let edit_memory = if options.edits { admission::for_edits() } else { 0 };
+    let resources = Resources { level: options.level, edit_memory };
+    Session::with_resources(scene.clone(), options.threads.clone(), resources)
+}
+
+/// What a user should know of a scene.
+fn notes_of(scene: &Scene) -> Vec<String> {
+    let of_method = method_of(&scene.render.method).notes(scene);
+    scene.notes().into_iter().chain(of_method).map(str::to_owned).collect()
+}

@@ -1,0 +1,176 @@
+//! The live session: random edits, undos and redos, against sessions from nothing.
+
+use super::{THREADS, base, patch};
+use serde_json::{Value, json};
+use std::path::Path;
+use std::sync::Arc;
+use tyndall::film::Image;
+use tyndall::integrator::METHODS;
+use tyndall::math::cast;
+use tyndall::simd::Level;
+use tyndall_live::{Budget, Input, LiveSession, Options};
+use tyndall_testing::SplitMix;
+
+fn options() -> Options {
+    Options { threads: THREADS.clone(), level: Level::best(), edits: true }
+}
+
+fn opened(document: &Value) -> LiveSession {
+    LiveSession::start(Input::of_document(document.clone(), Path::new("")), options()).expect("a scene")
+}
+
+fn refined(live: &mut LiveSession, samples: u32) -> Image {
+    live.refine(&Budget::samples(samples));
+    live.image()
+}
+
+/// The document but for the camera, which undo leaves alone.
+fn without_camera(live: &LiveSession) -> Value {
+    let mut document = live.document().to_value();
+    document.as_object_mut().expect("a table").remove("camera");
+    document
+}
+
+/// Every method of the list, so that a new one is held to it too.
+#[test]
+fn after_edits_undos_and_redos_the_picture_is_the_one_from_nothing() {
+    for method in METHODS {
+        let mut random = SplitMix::new(13);
+        let (mut undone, mut redone) = (0, 0);
+        for round in 0..12 {
+            let mut document = base(method.name);
+            document["render"][method.table()] =
+                method.write(&method.draft(&method.default_settings())).expect("settings");
+            let mut live = opened(&document);
+            refined(&mut live, 2);
+            // Documents that undo and redo lead to.
+            let (mut past, mut future) = (Vec::new(), Vec::new());
+            for _ in 0..10 {
+                let before = without_camera(&live);
+                match cast::index(4.0 * cast::single(random.uniform())) {
+                    0 => {
+                        let there = live.undo().expect("an undo").is_some();
+                        assert_eq!(there, !past.is_empty());
+                        if let Some(expected) = past.pop() {
+                            assert_eq!(without_camera(&live), expected, "round {round}");
+                            future.push(before);
+                            undone += 1;
+                        }
+                    }
+                    1 => {
+                        let there = live.redo().expect("a redo").is_some();
+                        assert_eq!(there, !future.is_empty());
+                        if let Some(expected) = future.pop() {
+                            assert_eq!(without_camera(&live), expected, "round {round}");
+                            past.push(before);
+                            redone += 1;
+                        }
+                    }
+                    _ => {
+                        let patch = patch(&mut random, &live.value());
+                        let is_edit = {
+                            let mut with = live.value().into_owned();
+                            let camera = with.as_object_mut().and_then(|d| d.remove("camera"));
+                            let mut after = tyndall_live::document::apply(&live.value(), &patch);
+                            let _ = (camera, after.as_object_mut().and_then(|d| d.remove("camera")));
+                            with != after
+                        };
+                        live.edit(&patch).expect("an edit");
+                        if is_edit {
+                            past.push(before);
+                            future.clear();
+                        }
+                    }
+                }
+                let samples = refined(&mut live, 1);
+                let taken = live.film().samples();
+                let mut fresh = live.fresh().expect("a session");
+                let expected = refined(&mut fresh, taken);
+                let even = live.film().mean_samples() == f64::from(taken);
+                assert!(!even || samples == expected, "{}, round {round}: {}", method.name, live.value());
+            }
+        }
+        assert!(undone > 8 && redone > 3, "{undone} undos, {redone} redos");
+    }
+}
+
+#[test]
+fn an_edit_that_fails_changes_nothing() {
+    let mut live = opened(&base("path"));
+    let picture = refined(&mut live, 1);
+    let value = live.value().into_owned();
+    for bad in [
+        json!({ "medium": { "densty": 1 } }),
+        json!({ "medium": { "density": 1e30 } }),
+        json!({ "medium": { "majorant_cell": 4 }, "render": { "path": { "majorant_cell": 4 } } }),
+        json!({ "transfer_function": { "preset": "no-such" } }),
+        json!({ "volume": { "procedural": null, "path": "no-such-file.nrrd" } }),
+        json!({ "camera": { "position": [0, 0, 9], "target": [0, 0, 9] } }),
+        json!({ "film": { "size": [16384, 16384] }, "lights": [{ "type": "no-such" }] }),
+    ] {
+        let error = live.edit(&bad).err().unwrap_or_else(|| panic!("{bad} is sound"));
+        assert!(error.to_string().starts_with("edit: ") || error.to_string().contains("no-such"), "{error}");
+        assert_eq!(*live.value(), value);
+        assert!(live.undo().expect("nothing to undo").is_none());
+        assert!(refined(&mut live, 1) == picture);
+    }
+}
+
+#[test]
+fn an_edit_with_a_key_at_its_old_place_is_read_with_a_note() {
+    let mut live = opened(&base("path"));
+    let report = live.edit(&json!({ "render": { "path": { "majorant_cell": 4 } } })).expect("an edit");
+    assert_eq!(report.notes.len(), 1, "{:?}", report.notes);
+    assert!(report.difference.majorants && live.document().medium.majorant_cell == 4);
+}
+
+#[test]
+fn notes_tell_what_is_new() {
+    let mut live = opened(&base("path"));
+    assert!(live.notes().is_empty(), "{:?}", live.notes());
+    let clear = json!({ "transfer_function": { "points": [{ "value": 0, "opacity": 0 }] } });
+    assert_eq!(live.edit(&clear).expect("an edit").notes.len(), 1);
+    assert!(live.edit(&json!({ "camera": { "fov": 20 } })).expect("an edit").notes.is_empty(), "told once");
+}
+
+/// What an edit leaves alone is shared with the scene before, and two sessions share their voxels.
+#[test]
+fn an_edit_rebuilds_only_what_it_touches() {
+    let mut live = opened(&base("path"));
+    let parts = |live: &LiveSession| {
+        let scene = live.scene();
+        let medium = &scene.medium;
+        let (volume, transfer) = (medium.shared_volume().clone(), medium.shared_transfer().clone());
+        (volume, transfer, scene.medium.clone(), scene.lights.clone())
+    };
+    for (patch, keeps) in [
+        (json!({ "camera": { "fov": 20 } }), [true, true, true]),
+        (json!({ "film": { "size": [20, 20], "background": [1, 0, 0] } }), [true, true, true]),
+        (
+            json!({ "lights": [{ "type": "point", "position": [9, 9, 9], "intensity": 9 }] }),
+            [true, true, false],
+        ),
+        (json!({ "medium": { "phase": { "type": "schlick", "k": 0.1 } } }), [true, false, true]),
+        (
+            json!({ "clip": [{ "type": "plane", "point": [0, 0, 0], "normal": [1, 0, 0] }] }),
+            [true, false, true],
+        ),
+        (json!({ "medium": { "density": 0.5 } }), [true, false, false]),
+        (json!({ "transfer_function": { "points": [{ "value": 0, "opacity": 1 }] } }), [false, false, false]),
+    ] {
+        let (volume, transfer, medium, lights) = parts(&live);
+        live.edit(&patch).expect("an edit");
+        let (volume_after, transfer_after, medium_after, lights_after) = parts(&live);
+        assert!(Arc::ptr_eq(&volume, &volume_after), "{patch}");
+        let kept = [
+            Arc::ptr_eq(&transfer, &transfer_after),
+            Arc::ptr_eq(&medium, &medium_after),
+            Arc::ptr_eq(&lights, &lights_after),
+        ];
+        assert_eq!(kept, keeps, "function, medium and lights after {patch}");
+        let opacities = |medium: &tyndall::medium::Medium| medium.majorants().opacities().as_ptr();
+        assert_eq!(opacities(&medium) == opacities(&medium_after), keeps[0], "majorants after {patch}");
+    }
+    let fresh = live.fresh().expect("a session");
+    assert!(Arc::ptr_eq(&parts(&fresh).0, &parts(&live).0), "two sessions share voxels");
+}

@@ -1,0 +1,188 @@
+//! Samples that survive edits \[Jonsson12, sec. 7\]: each is kept with what it depends on, and only those that an edit touched
+//! are taken again.
+
+use crate::film::{PixelSample, Tile};
+use crate::integrator::history::{Histories, Past, Reading, Touched};
+use crate::integrator::{Edited, ItemChanges};
+use crate::math::Rgb;
+use crate::scene::{Background, Difference, Scene};
+use crate::transfer::Grouping;
+use bytemuck::{Pod, Zeroable};
+
+/// Groups of values in a history.
+const GROUPS: u8 = 64;
+
+/// Bytes of a sample with its histories.
+const BYTES: usize = size_of::<Sample>() + 2 * GROUPS as usize / 8;
+
+/// What a session's samples are kept by.
+#[derive(Debug)]
+pub(super) struct SampleKeeper {
+    pub reading: Reading,
+    /// Samples of each pixel that are kept.
+    most: usize,
+}
+
+impl SampleKeeper {
+    /// Of a scene whose samples may take so many bytes; `None` where that is too few to keep one of every pixel.
+    pub fn new(scene: &Scene, bytes: usize) -> Option<Self> {
+        let most = Self::most(scene, bytes);
+        let reading = || Reading::new(&scene.medium, GROUPS, Grouping::Quantile);
+        (most > 0).then(|| Self { reading: reading(), most })
+    }
+
+    fn most(scene: &Scene, bytes: usize) -> usize {
+        let [width, height] = scene.size.map(|n| n as usize);
+        bytes / BYTES / width / height
+    }
+
+    /// Whether the next sample of a tile is to be kept: an early one, with none missing before it.
+    pub fn wants(&self, kept: &SampleTile, tile: &Tile) -> bool {
+        let next = tile.taken();
+        next < self.most * tile.pixel_count() && next <= kept.samples.len()
+    }
+
+    /// What an edit asks the samples for; `None` where all are to be taken anew.
+    pub fn update(&mut self, edit: &Edited) -> Option<SampleQuery> {
+        let Edited { old, new, difference } = *edit;
+        let Difference { volume, majorants, clip, seed, camera, size, .. } = *difference;
+        if volume || majorants || clip || seed || camera || size {
+            return None;
+        }
+        let touched = Touched::new(&self.reading.groups, old, new, difference);
+        let mut past = touched.paths;
+        if !difference.transfer.opacity.is_empty() {
+            let [sunk, raised] = self.reading.update(&old.medium, &new.medium);
+            past.flight |= sunk | raised;
+        }
+        let lights = !difference.lights.is_empty();
+        if lights || touched.glow {
+            // All that scatters asks one of all lights, by their power.
+            past.scatter = touched.matter;
+        }
+        let shows_sky = |scene: &Scene| scene.background == Background::Environment && scene.lights.has_sky();
+        let sky = lights && (shows_sky(old) || shows_sky(new));
+        Some(SampleQuery { past, behind: difference.background || sky })
+    }
+}
+
+/// What samples are asked for after an edit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SampleQuery {
+    past: Past,
+    /// Whether rays that meet nothing see something else.
+    behind: bool,
+}
+
+/// What a sample found.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+struct Sample {
+    /// The first is no number where the sample is to be taken again.
+    radiance: [f32; 3],
+    /// No number where no matter was met.
+    depth: f32,
+}
+
+/// The samples of a tile's pixels, in the order in which they are taken.
+#[derive(Clone, Debug)]
+pub struct SampleTile {
+    samples: Vec<Sample>,
+    flight: Histories,
+    scatter: Histories,
+    pub(super) counts: SampleCounts,
+}
+
+/// Samples of a tile since the last edit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct SampleCounts {
+    /// Taken, and kept.
+    pub taken: usize,
+    /// Found among those kept.
+    pub found: usize,
+}
+
+impl Default for SampleTile {
+    fn default() -> Self {
+        let histories = Histories::new(GROUPS);
+        Self {
+            samples: Vec::new(),
+            flight: histories.clone(),
+            scatter: histories,
+            counts: SampleCounts::default(),
+        }
+    }
+}
+
+impl SampleTile {
+    /// Samples kept.
+    pub fn len(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Bytes kept.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.samples[..]) + self.flight.bytes() + self.scatter.bytes()
+    }
+
+    /// The `i`-th sample, unless it is to be taken.
+    #[inline]
+    pub fn get(&mut self, i: usize) -> Option<PixelSample> {
+        let Sample { radiance, depth } = *self.samples.get(i)?;
+        if radiance[0].is_nan() {
+            return None;
+        }
+        self.counts.found += 1;
+        let met = !depth.is_nan();
+        Some(PixelSample {
+            radiance: Rgb::from(radiance),
+            alpha: f32::from(u8::from(met)),
+            depth: if met { depth } else { 0.0 },
+        })
+    }
+
+    /// Keeps the `i`-th sample of a tile of so many pixels, in place of what was there or after all others.
+    #[inline]
+    pub(super) fn put(&mut self, i: usize, sample: &PixelSample, past: &Past, pixels: usize) {
+        let depth = if sample.alpha > 0.0 { sample.depth } else { f32::NAN };
+        let sample = Sample { radiance: sample.radiance.to_array(), depth };
+        if i == self.samples.len() {
+            if self.samples.len() == self.samples.capacity() {
+                self.reserve(pixels.max(self.samples.len() / 4));
+            }
+            self.samples.push(sample);
+            self.flight.push(past.flight);
+            self.scatter.push(past.scatter);
+        } else {
+            self.samples[i] = sample;
+            self.flight.set(i, past.flight);
+            self.scatter.set(i, past.scatter);
+        }
+        self.counts.taken += 1;
+    }
+
+    fn reserve(&mut self, more: usize) {
+        self.samples.reserve_exact(more);
+        self.flight.reserve(more);
+        self.scatter.reserve(more);
+    }
+
+    /// Gives up the samples that an edit touched.
+    pub(super) fn ask(&mut self, query: &SampleQuery) {
+        let SampleQuery { past: asked, behind } = query;
+        for (i, sample) in self.samples.iter_mut().enumerate() {
+            let past = Past { flight: self.flight.get(i), scatter: self.scatter.get(i) };
+            if past.meets(asked) || (*behind && sample.depth.is_nan()) {
+                sample.radiance[0] = f32::NAN;
+            }
+        }
+        self.counts = SampleCounts::default();
+    }
+
+    /// How its samples differ from those of another time.
+    pub fn compare(&self, other: &Self) -> ItemChanges {
+        let pairs = self.samples.iter().zip(&other.samples);
+        let differing = pairs.filter(|(a, b)| bytemuck::bytes_of(*a) != bytemuck::bytes_of(*b)).count();
+        ItemChanges { differing, new: self.len().saturating_sub(other.len()) }
+    }
+}

@@ -1,0 +1,292 @@
+//! The march along packets of view rays, and shadow rays from where they meet matter.
+
+use super::Settings;
+use crate::film::{PixelSample, Tile};
+use crate::integrator::Stop;
+use crate::math::{Ray, Rgb, Vec3};
+use crate::medium::{MOST_LANES, PacketMarch, Track};
+use crate::scattering::Event;
+use crate::scene::Scene;
+use crate::simd::{Kernel, Lanes, Level, one_minus_exp};
+use fearless_simd::prelude::*;
+
+/// Transmittance below which what is behind no longer shows.
+const OPAQUE: f32 = 1e-4;
+
+/// The ray marcher with its fixed points on lights.
+#[derive(Clone, Debug)]
+pub struct RayMarch {
+    /// World units.
+    step: f32,
+    /// In the unit square, the same for every shaded point.
+    light_points: Vec<[f32; 2]>,
+    level: Level,
+}
+
+impl RayMarch {
+    /// Of a scene, with these vector instructions.
+    #[must_use]
+    pub fn of_scene(scene: &Scene, settings: &Settings, level: Level) -> Self {
+        let Settings { step, light_samples } = *settings;
+        let light_points = (0..light_samples).map(|i| hammersley(i, light_samples)).collect();
+        Self { step: step * scene.medium.volume().grid().voxel_size(), light_points, level }
+    }
+
+    /// Adds one ray to every pixel of a tile until each has `samples`; see [`crate::integrator::Method::refine`].
+    pub(super) fn refine_tile(
+        &self,
+        scene: &Scene,
+        tile: &mut Tile,
+        pending: &mut Option<Box<Packet>>,
+        samples: u32,
+        stop: &Stop,
+    ) {
+        self.level.run(Refine { raymarch: self, scene, tile, pending, samples, stop });
+    }
+
+    /// The radiance that arrives along a world ray.
+    #[must_use]
+    pub fn march(&self, scene: &Scene, ray: &Ray) -> PixelSample {
+        self.level.run(March { raymarch: self, scene, packet: Packet::new(scene, [*ray].into_iter()) })
+    }
+
+    /// A pixel's `sample`-th ray. Samples serve the pixel filter and the lens alone; the first goes
+    /// through the pixel's middle.
+    fn ray(scene: &Scene, [x, y]: [u32; 2], sample: u32) -> Ray {
+        let [in_x, in_y] = spread(sample);
+        let film = [x as f32 + in_x, y as f32 + in_y];
+        // The lens point walks its own lattice, turned per pixel so that blur becomes grain, not ghosts.
+        let [turn_x, turn_y] = spread(y.wrapping_mul(7919).wrapping_add(x));
+        let [u, v] = spread(sample.wrapping_mul(3));
+        scene.camera.ray(scene.size, film, [(u + turn_x).fract(), (v + turn_y).fract()])
+    }
+
+    /// Marches a packet to its end, or for one shaded point at least when told to stop; gives whether it has ended.
+    #[inline(always)]
+    fn go_on<S: Lanes>(&self, simd: S, scene: &Scene, packet: &mut Packet, stop: &Stop) -> bool {
+        let medium = &*scene.medium;
+        let shines = scene.render.max_scatter > 0;
+        let glowing = if medium.transfer().emits() { packet.count } else { 0 };
+        let most = S::f32s::splat(simd, 1.0 - OPAQUE);
+        let mut alpha = S::f32s::from_slice(simd, &packet.alpha[..S::WIDTH]);
+        let mut depth = S::f32s::from_slice(simd, &packet.depth[..S::WIDTH]);
+        let mut march = PacketMarch::<S>::new(simd, medium, &packet.tracks, self.step);
+        march.go_to(S::i32s::from_slice(simd, &packet.k[..S::WIDTH]));
+        march.active &= alpha.simd_lt(most);
+        let mut moved = false;
+        loop {
+            let k = march.step();
+            let Some(sample) = march.next() else { break };
+            // The sum of all shares so far leaves this transmittance.
+            let covered = one_minus_exp(simd, sample.thickness) * (-alpha + 1.0);
+            if shines {
+                for lane in packet.shaded..packet.count {
+                    let covered = covered.as_slice()[lane];
+                    if covered <= 0.0 {
+                        continue;
+                    }
+                    if moved && stop.reached() {
+                        // The same sample comes again, of which some lanes are shaded already.
+                        packet.shaded = lane;
+                        packet.keep::<S>(k, alpha, depth);
+                        return false;
+                    }
+                    let [x, y, z] = sample.place;
+                    let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
+                    let w_out = -packet.rays[lane].direction;
+                    let source = self.source(simd, scene, place, sample.value.as_slice()[lane], w_out);
+                    packet.radiance[lane] += source * covered;
+                    moved = true;
+                }
+            } else {
+                if moved && stop.reached() {
+                    packet.keep::<S>(k, alpha, depth);
+                    return false;
+                }
+                for lane in 0..glowing {
+                    let emitted = medium.transfer().emitted(sample.value.as_slice()[lane]);
+                    packet.radiance[lane] += emitted * covered.as_slice()[lane];
+                }
+                moved = true;
+            }
+            packet.shaded = 0;
+            alpha += covered;
+            depth += sample.t * covered;
+            march.active &= alpha.simd_lt(most);
+        }
+        packet.keep::<S>(march.step(), alpha, depth);
+        true
+    }
+
+    /// What a point adds to a ray that goes along `w_out`, per unit of extinction.
+    #[inline(always)]
+    fn source<S: Lanes>(&self, simd: S, scene: &Scene, place: Vec3, value: f32, w_out: Vec3) -> Rgb {
+        let medium = &*scene.medium;
+        let optics = medium.transfer().optics(value);
+        let here = medium.volume().grid().index_to_world(place);
+        optics.emitted() + self.direct(simd, scene, &medium.event(place, &optics), here, w_out)
+    }
+
+    /// Light from every lamp that a point scatters to `w_out`, per unit extinction.
+    #[inline(always)]
+    fn direct<S: Lanes>(&self, simd: S, scene: &Scene, event: &Event, here: Vec3, w_out: Vec3) -> Rgb {
+        let medium = &*scene.medium;
+        let mut sum = Rgb::BLACK;
+        for light in scene.lights.lights() {
+            let points = if light.can_be_passed() { &self.light_points[..] } else { &[[0.5; 2]] };
+            let share = 1.0 / points.len() as f32;
+            for &u in points {
+                let Some(sample) = light.sample(here, u) else { continue };
+                let unshadowed = event.eval(w_out, sample.direction) * sample.radiance * share;
+                if unshadowed.is_black() {
+                    continue;
+                }
+                let track = medium.track(&Ray::new(here, sample.direction), sample.distance);
+                let thickness = medium.thickness_lanes(simd, &track, self.step, -OPAQUE.ln());
+                sum += unshadowed * (-thickness).exp();
+            }
+        }
+        sum
+    }
+}
+
+/// Rays that march together, at most one per lane.
+#[derive(Clone, Debug)]
+pub struct Packet {
+    count: usize,
+    rays: [Ray; MOST_LANES],
+    tracks: [Track; MOST_LANES],
+    /// The step to go on with.
+    k: [i32; MOST_LANES],
+    /// Lanes whose point at that step has been shaded already.
+    shaded: usize,
+    radiance: [Rgb; MOST_LANES],
+    alpha: [f32; MOST_LANES],
+    /// Sum of the distances inside the medium, weighted by what they add to `alpha`.
+    depth: [f32; MOST_LANES],
+}
+
+impl Packet {
+    fn new(scene: &Scene, rays: impl Iterator<Item = Ray>) -> Self {
+        let mut packet = Self {
+            count: 0,
+            rays: [Ray::default(); MOST_LANES],
+            tracks: [Track::default(); MOST_LANES],
+            k: [0; MOST_LANES],
+            shaded: 0,
+            radiance: [Rgb::BLACK; MOST_LANES],
+            alpha: [0.0; MOST_LANES],
+            depth: [0.0; MOST_LANES],
+        };
+        for ray in rays {
+            packet.rays[packet.count] = ray;
+            packet.tracks[packet.count] = scene.medium.track(&ray, f32::INFINITY);
+            packet.count += 1;
+        }
+        packet
+    }
+
+    /// Where the march stands, and what it has met.
+    #[inline(always)]
+    fn keep<S: Lanes>(&mut self, k: S::i32s, alpha: S::f32s, depth: S::f32s) {
+        k.store_slice(&mut self.k[..S::WIDTH]);
+        alpha.store_slice(&mut self.alpha[..S::WIDTH]);
+        depth.store_slice(&mut self.depth[..S::WIDTH]);
+    }
+
+    /// What a ray has found in the end.
+    fn sample(&self, scene: &Scene, lane: usize) -> PixelSample {
+        let (alpha, direction) = (self.alpha[lane], self.rays[lane].direction);
+        let distance = self.depth[lane] + alpha * self.tracks[lane].distance(0.0);
+        PixelSample {
+            radiance: self.radiance[lane] + scene.behind(direction) * (1.0 - alpha),
+            alpha,
+            depth: distance * direction.dot(scene.camera.view()),
+        }
+    }
+}
+
+struct Refine<'a> {
+    raymarch: &'a RayMarch,
+    scene: &'a Scene,
+    tile: &'a mut Tile,
+    pending: &'a mut Option<Box<Packet>>,
+    samples: u32,
+    stop: &'a Stop<'a>,
+}
+
+impl Kernel for Refine<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, simd: S) {
+        let Self { raymarch, scene, tile, pending, samples, stop } = self;
+        while tile.samples() < samples {
+            let mut packet = pending.take().unwrap_or_else(|| {
+                let (pixels, sample) = tile.next(S::WIDTH);
+                Box::new(Packet::new(scene, pixels.map(|pixel| RayMarch::ray(scene, pixel, sample))))
+            });
+            if !raymarch.go_on(simd, scene, &mut packet, stop) {
+                *pending = Some(packet);
+                return;
+            }
+            for lane in 0..packet.count {
+                tile.add(&packet.sample(scene, lane));
+            }
+            if stop.reached() {
+                return;
+            }
+        }
+    }
+}
+
+struct March<'a> {
+    raymarch: &'a RayMarch,
+    scene: &'a Scene,
+    packet: Packet,
+}
+
+impl Kernel for March<'_> {
+    type Output = PixelSample;
+
+    #[inline(always)]
+    fn run<S: Lanes>(mut self, simd: S) -> PixelSample {
+        while !self.raymarch.go_on(simd, self.scene, &mut self.packet, &Stop::never()) {}
+        self.packet.sample(self.scene, 0)
+    }
+}
+
+/// The `i`-th of `n` points of the Hammersley set: stratified in both coordinates.
+fn hammersley(i: u32, n: u32) -> [f32; 2] {
+    let radical_inverse = (i.reverse_bits() >> 8) as f32 / (1 << 24) as f32;
+    [(i as f32 + 0.5) / n as f32, radical_inverse + 0.5 / n as f32 % 1.0]
+}
+
+/// The `i`-th point of the R2 sequence \[Roberts18\], which begins in the middle of the unit square.
+fn spread(i: u32) -> [f32; 2] {
+    // Inverse powers of the plastic number, as fractions of 2^32, so that no bit is lost for large i.
+    let at = |step: u32| (i.wrapping_mul(step).wrapping_add(1 << 31) >> 8) as f32 / (1 << 24) as f32;
+    [at(0xC13F_A9A9), at(0x91E1_0DA6)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fixed_points_are_stratified_and_inside_the_square() {
+        for n in [1, 16, 256] {
+            let mut strata = vec![0; n as usize];
+            for i in 0..n {
+                let [u, v] = hammersley(i, n);
+                assert!((0.0..1.0).contains(&u) && (0.0..1.0).contains(&v), "{u}, {v} of {n}");
+                strata[crate::math::cast::index(v * n as f32)] += 1;
+            }
+            assert!(strata.iter().all(|&k| k == 1), "{n}");
+        }
+        assert_eq!(spread(0), [0.5, 0.5]);
+        let n = 4096;
+        let mean = (0..n).map(|i| spread(i)[1]).sum::<f32>() / n as f32;
+        assert!((mean - 0.5).abs() < 1e-3, "{mean}");
+    }
+}

@@ -1,0 +1,59 @@
+//! Emission, absorption and single scattering by marching along the view ray, with shadow rays to
+//! every light: the fast, flat, deterministic picture.
+//!
+//! Light that glowing matter sends to other matter is left out.
+
+mod march;
+mod settings;
+
+pub use march::RayMarch;
+pub use settings::Settings;
+
+use super::{Method, Resources, Stop};
+use crate::film::Tile;
+use crate::scene::{Difference, Scene};
+use march::Packet;
+
+impl Method for RayMarch {
+    const NAME: &'static str = "raymarch";
+    const ABOUT: &'static str = "Ray marching with shadow rays: emission, absorption and single scattering; deterministic, fast and flat.";
+    const HAS_NOISE: bool = false;
+
+    type Settings = Settings;
+    /// A packet that a stop left half done.
+    type TileState = Option<Box<Packet>>;
+
+    fn draft(settings: &Settings) -> Settings {
+        Settings { step: settings.step.max(0.2), light_samples: settings.light_samples.min(4) }
+    }
+
+    fn notes(_: &Settings, scene: &Scene) -> Vec<&'static str> {
+        if scene.medium.transfer().emits() {
+            vec![
+                "`raymarch` leaves out the light that glowing matter sends to other matter; the default method has it",
+            ]
+        } else {
+            Vec::new()
+        }
+    }
+
+    fn new(scene: &Scene, settings: &Settings, resources: &Resources) -> Self {
+        Self::of_scene(scene, settings, resources.level)
+    }
+
+    fn is_touched_by(&self, difference: &Difference) -> bool {
+        // Cells decide in which order a march adds up what it meets.
+        difference.view() || difference.light() || difference.majorants
+    }
+
+    fn refine(
+        &self,
+        scene: &Scene,
+        tile: &mut Tile,
+        pending: &mut Option<Box<Packet>>,
+        samples: u32,
+        stop: &Stop,
+    ) {
+        self.refine_tile(scene, tile, pending, samples, stop);
+    }
+}
