@@ -11,6 +11,7 @@ use serde_json::Value;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 use tyndall::film::{Film, Image};
 use tyndall::integrator::{MethodReport, Resources, method_of};
 use tyndall::scene::{Difference, Scene};
@@ -64,6 +65,8 @@ pub struct EditReport {
     pub difference: Difference,
     /// What a user should know of the scene now that was not so before, a sentence each.
     pub notes: Vec<String>,
+    /// Time from the patch to the edited scene.
+    pub to_scene: Duration,
 }
 
 impl LiveSession {
@@ -141,13 +144,16 @@ impl LiveSession {
     /// # Errors
     /// The same.
     pub fn edit_at(&mut self, patch: &Value, at: &str) -> Result<EditReport, LiveError> {
+        let begun = Instant::now();
         let mut patch = patch.clone();
         let moved = document::move_old_keys(&mut patch)
             .map_err(|source| LiveError::Document { at: at.to_owned(), source })?;
         let before = self.value().into_owned();
         let after = document::apply(&before, &patch);
+        let patching = begun.elapsed();
         let mut report = self.go_to(after, at)?;
         self.undo.remember(&before, &self.value);
+        report.to_scene += patching;
         report.notes.splice(0..0, moved);
         Ok(report)
     }
@@ -177,6 +183,7 @@ impl LiveSession {
 
     /// Goes on with another document; nothing changes before all of it has been found sound.
     fn go_to(&mut self, value: Value, at: &str) -> Result<EditReport, LiveError> {
+        let begun = Instant::now();
         let (document, assets) = self.parse(value.clone(), at)?;
         admission::film(&document, at)?;
         let built = self
@@ -185,11 +192,12 @@ impl LiveSession {
             .install(|| self.built.edited(document, assets))
             .map_err(|source| LiveError::Scene { at: at.to_owned(), source })?;
         admission::method(&built.scene, at)?;
+        let to_scene = begun.elapsed();
         let difference = self.session.set_scene(built.scene.clone());
         let known = notes_of(&self.built.scene);
         let notes = notes_of(&built.scene).into_iter().filter(|note| !known.contains(note)).collect();
         (self.value, self.built) = (value, built);
-        Ok(EditReport { difference, notes })
+        Ok(EditReport { difference, notes, to_scene })
     }
 
     /// The document of a value, with what it names; what the present document names too is shared with it.

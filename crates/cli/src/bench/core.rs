@@ -6,6 +6,7 @@ use super::timing::Effort;
 use crate::Failure;
 use serde_json::json;
 use std::time::{Duration, Instant};
+use tyndall::integrator::METHODS;
 use tyndall::math::{Ray, Vec3};
 use tyndall::medium::{MajorantGrid, Medium};
 use tyndall::sampling::Stream;
@@ -118,8 +119,9 @@ pub fn paths(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
         let bench = Bench::new(value, 1)?;
         let side = effort.pick(256, 64);
         let scene = |cell: u32| {
-            let render = json!({ "integrator": "path", "max_scatter": 2, "path": { "majorant_cell": cell } });
-            bench.scene(&json!({ "film": { "size": [side, side] }, "render": render }))
+            let render = json!({ "integrator": "path", "max_scatter": 2 });
+            let medium = json!({ "majorant_cell": cell });
+            bench.scene(&json!({ "film": { "size": [side, side] }, "medium": medium, "render": render }))
         };
         let (global, local) = (scene(0)?, scene(8)?);
         let run = |scene: &Scene| drop(bench.render(scene, level, 2));
@@ -157,7 +159,7 @@ pub fn latency(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str = "latency, two threads";
     let bench = Bench::new(ct(effort.pick(256, 64)), 2)?;
     let mut rows = Vec::new();
-    for integrator in ["raymarch", "path"] {
+    for integrator in METHODS.iter().map(|method| method.name) {
         let patch = json!({ "render": { "integrator": integrator, "max_scatter": 1000 } });
         let mut session = Session::with_level(bench.scene(&patch)?, bench.threads().clone(), level);
         let mut late: Vec<f64> = (0..effort.pick(40, 4))

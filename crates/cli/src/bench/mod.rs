@@ -8,6 +8,7 @@ mod historygram_figures;
 mod historygrams;
 mod photon_scenes;
 mod samples;
+mod scene_edits;
 mod scenes;
 mod timing;
 
@@ -89,8 +90,15 @@ impl Row {
 /// Measures the rows of one table with certain vector instructions.
 type Table = fn(&timing::Effort, tyndall::simd::Level) -> Result<Vec<Row>, Failure>;
 
-const CORE: &[Table] =
-    &[core::sampling, core::flight, core::paths, core::threads, core::latency, growth::curves];
+const CORE: &[Table] = &[
+    core::sampling,
+    core::flight,
+    core::paths,
+    core::threads,
+    core::latency,
+    scene_edits::costs,
+    growth::curves,
+];
 
 const HISTORYGRAMS: &[Table] = &[
     historygrams::cornell_box,

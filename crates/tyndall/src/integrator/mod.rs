@@ -3,10 +3,14 @@
 //! A new method is a folder with a type that implements [`Method`], and a line in each of the two lists here. Command line, scene
 //! document, sessions, tests and continuous integration go over [`METHODS`].
 
+mod cells;
 mod engine;
 mod history;
+mod light_paths;
 mod method;
+mod next_event;
 mod stop;
+mod view_march;
 
 pub mod path;
 pub mod photon;

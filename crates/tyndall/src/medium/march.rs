@@ -199,15 +199,10 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
         self.go_to(k);
     }
 
-    /// The next samples of which one at least met matter.
+    /// The next samples of which one at least met matter; `notes` hears of all that is read. No lane's bits depend on what is in
+    /// the others.
     #[inline(always)]
-    pub fn next(&mut self) -> Option<PacketSample<S>> {
-        self.next_noting(&mut ())
-    }
-
-    /// [`Self::next`] that tells all that it reads. No lane's bits depend on what is in the others.
-    #[inline(always)]
-    pub fn next_noting<N: MarchNotes<S>>(&mut self, notes: &mut N) -> Option<PacketSample<S>> {
+    pub fn next<N: MarchNotes<S>>(&mut self, notes: &mut N) -> Option<PacketSample<S>> {
         let simd = self.simd;
         let zero = S::f32s::splat(simd, 0.0);
         while self.active.any_true() {

@@ -13,7 +13,7 @@ pub use clip::{Clip, ClipShape};
 pub use free_flight::Collision;
 pub(crate) use free_flight::FlightNotes;
 pub use majorants::{CellStretch, CellWalk, MajorantGrid};
-pub(crate) use march::{MOST_LANES, MarchNotes, PacketMarch};
+pub(crate) use march::{MOST_LANES, MarchNotes, PacketMarch, PacketSample};
 
 use crate::math::{Interval, Ray, Vec3, cast};
 use crate::scattering::{Brdf, Event, Phase, Surface, surface_share};

@@ -4,11 +4,10 @@ use super::samples::{SampleKeeper, SampleTile};
 use crate::film::{PixelSample, Tile};
 use crate::integrator::Stop;
 use crate::integrator::history::{Past, Writer};
-use crate::light::LightSample;
-use crate::math::{Ray, Rgb, Vec3};
+use crate::integrator::next_event::ScatteringPoint;
+use crate::math::{Ray, Rgb};
 use crate::medium::FlightNotes;
-use crate::sampling::{BounceSample, PathSampler};
-use crate::scattering::Event;
+use crate::sampling::PathSampler;
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes};
 use std::ops::ControlFlow;
@@ -180,8 +179,8 @@ impl CameraPath {
         }
         let event = medium.event(collision.place, &optics);
         let here = medium.volume().grid().index_to_world(collision.place);
-        seen.radiance +=
-            *throughput * direct(simd, scene, &event, here, -ray.direction, &u, (numbers, notes));
+        let point = ScatteringPoint { event: &event, position: here, w_out: -ray.direction };
+        seen.radiance += *throughput * point.direct(simd, scene, &u, &mut numbers.stream, notes);
         let Some(scattered) = event.sample(-ray.direction, u.scatter) else { return ControlFlow::Break(()) };
         *throughput *= scattered.weight;
         let brightest = throughput.max_component();
@@ -197,30 +196,4 @@ impl CameraPath {
         *order += 1;
         ControlFlow::Continue(())
     }
-}
-
-/// Next-event estimation: what one light, drawn by power, sends to a point and on to `w_out`.
-#[inline(always)]
-fn direct<S: Lanes>(
-    simd: S,
-    scene: &Scene,
-    event: &Event,
-    here: Vec3,
-    w_out: Vec3,
-    u: &BounceSample,
-    (numbers, notes): (&mut PathSampler, &mut impl FlightNotes),
-) -> Rgb {
-    let medium = &*scene.medium;
-    let Some(light) = scene.lights.sample(medium, here, u, &mut numbers.stream) else { return Rgb::BLACK };
-    let unshadowed = event.eval(w_out, light.direction) * light.radiance * balance(event, w_out, &light);
-    if unshadowed.is_black() {
-        return Rgb::BLACK;
-    }
-    let track = medium.track(&Ray::new(here, light.direction), light.distance);
-    unshadowed * medium.transmittance_lanes(simd, &track, &mut numbers.stream, notes)
-}
-
-/// Weight of drawing the light against drawing the scattered direction.
-fn balance(event: &Event, w_out: Vec3, light: &LightSample) -> f32 {
-    if light.pdf.is_infinite() { 1.0 } else { light.pdf / (light.pdf + event.pdf(w_out, light.direction)) }
 }

@@ -1,12 +1,12 @@
 //! What of light paths, photons and segments an edit leaves valid.
 
-use super::lights::{LightPaths, Plan, sources};
-use super::{PhotonMapper, SegmentTile, places_for, step};
+use super::stored::Photon;
+use super::{PhotonMapper, SegmentTile, marks_for, plan, step};
 use crate::integrator::Edited;
 use crate::integrator::history::Touched;
+use crate::integrator::light_paths::{LightPaths, sources};
 use crate::light::Light;
 use crate::scene::Scene;
-use std::sync::atomic::Ordering;
 
 impl PhotonMapper {
     /// Drops what an edit touched of paths, photons and segments, and nothing else; false where all is to begin anew.
@@ -21,14 +21,14 @@ impl PhotonMapper {
             let [_, raised] = self.ground.reading.update(&old.medium, &new.medium);
             touched.paths.flight |= raised;
         }
-        self.traced.store(0, Ordering::Relaxed);
+        self.traced = 0;
         self.pass = None;
         // With other steps, segments end elsewhere, and the widest slice of a beam is another.
         let steps = step(old, &self.settings) != step(new, &self.settings);
         if steps {
-            self.places = places_for(new, &self.settings);
+            self.marks = marks_for(new, &self.settings);
         } else if tiles.iter().all(|tile| tile.as_ref().is_none_or(SegmentTile::is_settled)) {
-            self.places.clear();
+            self.marks.clear();
         }
         for light in &mut self.lights {
             light.chunks.iter_mut().for_each(|chunk| chunk.add_change(&touched.paths));
@@ -52,11 +52,11 @@ impl PhotonMapper {
     /// Keeps the paths of lights that send the same ones, wherever they are now among the lights.
     fn update_lights(&mut self, scene: &Scene, glow: bool) {
         let sources = sources(scene);
-        let plan = Plan::new(scene, &self.settings, 0, sources.len());
-        let mut old: Vec<Option<LightPaths>> = self.lights.drain(..).map(Some).collect();
+        let plan = plan(scene, &self.settings, sources.len());
+        let mut old: Vec<Option<LightPaths<Photon>>> = self.lights.drain(..).map(Some).collect();
         for (light, stream) in sources {
             let kept = old.iter_mut().find(|old| old.as_ref().is_some_and(|old| old.stream == stream));
-            let same = |old: &LightPaths| match (&old.light, &light) {
+            let same = |old: &LightPaths<Photon>| match (&old.light, &light) {
                 (Some(old), Some(light)) => old.same_paths(light),
                 (None, None) => !glow,
                 _ => false,
@@ -96,7 +96,7 @@ impl PhotonMapper {
     }
 
     /// Marks where all photons of a light are.
-    fn mark(&self, light: &LightPaths) {
-        light.chunks.iter().for_each(|chunk| self.places.mark_all(chunk.photons()));
+    fn mark(&self, light: &LightPaths<Photon>) {
+        light.chunks.iter().for_each(|chunk| self.marks.mark_all(chunk.vertices()));
     }
 }

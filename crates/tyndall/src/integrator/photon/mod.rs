@@ -9,24 +9,22 @@
 //! from nothing, bit for bit. The first sample of every pixel is this *base map*; later ones are refinement passes with
 //! photons of their own and a shrinking radius \[Knaus11\], and start anew after an edit.
 
-mod chunk;
 mod edit;
 mod gather;
-mod grid;
 mod kernel;
-mod lights;
 mod map;
 mod matter;
 mod pass;
-mod paths;
 mod segments;
 mod settings;
-mod spatial;
+mod stored;
 mod view;
 
 pub use settings::{Estimate, Histories, HistoryBins, Settings, SpatialHistory};
 
+use super::cells::{CellGrid, ChangeMarks};
 use super::history::Reading;
+use super::light_paths::{Chunk, Ground, HistoryDetail, LightPaths, Plan, Tracing, most_kept, sources};
 use super::{
     Edited, ItemChanges, KeptCount, KeptItems, Limits, MemoryNeed, Method, MethodReport, NamedCount,
     PixelCounts, Resources, SettingProblem, Stages, Stop, WorkShare,
@@ -35,16 +33,13 @@ use crate::film::Tile;
 use crate::light::Enclosure;
 use crate::math::DVec3;
 use crate::scene::{Difference, Scene};
-use grid::CellGrid;
 use kernel::Slice;
-use lights::{Ground, LightPaths, Plan, sources, trace};
 use map::{Lit, PhotonMap};
 use pass::Pass;
 use segments::{Refine, SegmentCounts, SegmentTile};
 use settings::Estimator;
-use spatial::Changed;
 use std::any::Any;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use stored::Photon;
 use view::View;
 
 /// Light paths, photons, and what is known about edits since; the segments lie with their tiles.
@@ -52,17 +47,17 @@ use view::View;
 pub struct PhotonMapper {
     settings: Settings,
     ground: Ground,
-    lights: Vec<LightPaths>,
+    lights: Vec<LightPaths<Photon>>,
     /// Of the base map; `None` where photons have changed since.
     map: Option<PhotonMap>,
     /// Where photons changed since the segments last asked.
-    places: Changed,
+    marks: ChangeMarks,
     /// Whether there may be segments that an edit leaves valid.
     has_segments: bool,
     /// The refinement pass that is being made or used.
     pass: Option<Pass>,
     /// Paths traced since the last edit.
-    traced: AtomicUsize,
+    traced: usize,
 }
 
 impl PhotonMapper {
@@ -70,8 +65,8 @@ impl PhotonMapper {
     /// be, and a refinement pass beside the base map.
     fn most_bytes(settings: &Settings, max_scatter: u32, size: [u32; 2]) -> u64 {
         let history = u64::from(settings.history_bits).div_ceil(8);
-        let photon = size_of::<paths::Photon>() as u64 + map::BYTES;
-        let interactions = paths::most_kept(max_scatter) * (2 * photon + 2 * history) as f64;
+        let photon = size_of::<Photon>() as u64 + map::BYTES;
+        let interactions = most_kept(max_scatter) * (2 * photon + 2 * history) as f64;
         let paths = f64::from(settings.photons) * (interactions + (16 + 2 * history) as f64);
         let segments = u64::from(size[0]) * u64::from(size[1]) * u64::from(settings.segments);
         crate::math::cast::whole(paths).saturating_add(segments.saturating_mul(segments::BYTES + history))
@@ -79,7 +74,7 @@ impl PhotonMapper {
 
     /// Photons of the base map, once it is made.
     fn photons(&self) -> usize {
-        self.lights.iter().flat_map(|light| &light.chunks).map(|chunk| chunk.photons().len()).sum()
+        self.lights.iter().flat_map(|light| &light.chunks).map(|chunk| chunk.vertices().len()).sum()
     }
 
     /// Light paths.
@@ -90,8 +85,7 @@ impl PhotonMapper {
     /// What is kept for edits to come beside segments.
     fn kept_paths(&self) -> [KeptCount; 3] {
         let chunks = || self.lights.iter().flat_map(|light| &light.chunks);
-        let [paths, photons] =
-            chunks().map(chunk::Chunk::bytes).fold([0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        let [paths, photons] = chunks().map(Chunk::bytes).fold([0; 2], |[a, b], [c, d]| [a + c, b + d]);
         let count = self.photons();
         let map = self.map.as_ref().map_or(0, PhotonMap::bytes);
         [
@@ -158,7 +152,7 @@ impl Method for PhotonMapper {
         let medium = &*scene.medium;
         let reading = Reading::new(medium, settings.groups(), settings.grouping());
         let sources = sources(scene);
-        let plan = Plan::new(scene, settings, 0, sources.len());
+        let plan = plan(scene, settings, sources.len());
         let lights = sources.into_iter().map(|source| LightPaths::new(source, &plan)).collect();
         let enclosure = Enclosure::new(medium.volume().grid());
         Self {
@@ -166,10 +160,10 @@ impl Method for PhotonMapper {
             ground: Ground { reading, enclosure, level: resources.level },
             lights,
             map: None,
-            places: places_for(scene, settings),
+            marks: marks_for(scene, settings),
             has_segments: false,
             pass: None,
-            traced: AtomicUsize::new(0),
+            traced: 0,
         }
     }
 
@@ -184,7 +178,7 @@ impl Method for PhotonMapper {
     }
 
     fn count_anew(&mut self, tiles: &mut [Option<SegmentTile>]) {
-        self.traced.store(0, Ordering::Relaxed);
+        self.traced = 0;
         tiles.iter_mut().flatten().for_each(|tile| tile.computed = SegmentCounts::default());
     }
 
@@ -200,14 +194,15 @@ impl Method for PhotonMapper {
             }
             return self.pass.as_mut().is_some_and(|pass| pass.prepare(scene, &self.ground, limits));
         }
-        let off = Changed::off();
-        let places = if self.has_segments { &self.places } else { &off };
-        let before = self.traced.load(Ordering::Relaxed);
-        let whole = trace(&mut self.lights, scene, &self.ground, 0, places, &self.traced, limits);
-        if self.traced.load(Ordering::Relaxed) > before {
+        let off = ChangeMarks::off();
+        let marks = if self.has_segments { &self.marks } else { &off };
+        let tracing = Tracing { scene, ground: &self.ground, pass: 0, marks, limits };
+        let done = tracing.trace(&mut self.lights);
+        self.traced += done.traced;
+        if done.traced > 0 {
             self.map = None;
         }
-        if !whole {
+        if !done.finished {
             return false;
         }
         if self.map.is_none() {
@@ -247,14 +242,14 @@ impl Method for PhotonMapper {
             SegmentTile::new(pixels, per_ray, groups.count())
         });
         let view = View { scene, map: self.map.as_ref(), step, gather_spacing };
-        level.run(Refine { view, segments, tile, groups, cells, places: &self.places, stop });
+        level.run(Refine { view, segments, tile, groups, cells, places: &self.marks, stop });
     }
 
     fn report(&self, tiles: &[Option<SegmentTile>], _: &PixelCounts) -> MethodReport {
         let sum = |of: fn(&SegmentTile) -> usize| tiles.iter().flatten().map(of).sum::<usize>();
         let (segments, bytes) = (sum(SegmentTile::len), sum(SegmentTile::bytes));
         let computed = sum(|tile| tile.computed.segments);
-        let traced = self.traced.load(Ordering::Relaxed);
+        let traced = self.traced;
         let segments_kept = KeptCount { name: "segments", count: segments, bytes };
         MethodReport {
             recomputed: vec![
@@ -270,6 +265,20 @@ impl Method for PhotonMapper {
 
     fn kept_items(&self, tiles: &[Option<SegmentTile>]) -> Option<Box<dyn KeptItems>> {
         Some(Box::new(KeptLight { lights: self.lights.clone(), tiles: tiles.to_vec() }))
+    }
+}
+
+/// The paths of the base map from each of so many sources.
+fn plan(scene: &Scene, settings: &Settings, sources: usize) -> Plan {
+    Plan {
+        count: Plan::share(settings.photons, sources),
+        seed: scene.render.seed,
+        pass: 0,
+        groups: settings.groups(),
+        histories: match settings.histories {
+            Histories::Interactions => HistoryDetail::Vertices,
+            Histories::Paths => HistoryDetail::Paths,
+        },
     }
 }
 
@@ -296,30 +305,30 @@ fn cells_for(scene: &Scene, settings: &Settings, radius: f32) -> CellGrid {
 
 /// Where photons will change, in the map's own cells: photons are added up in the order of whole cells, so that one beside a
 /// gather moves its last bit.
-fn places_for(scene: &Scene, settings: &Settings) -> Changed {
+fn marks_for(scene: &Scene, settings: &Settings) -> ChangeMarks {
     let medium = &*scene.medium;
     let grid = cells_for(scene, settings, settings.radius);
     // When so many photons have changed, few segments are left that gather none of them.
     let enough = settings.photons as usize / 2;
     match settings.spatial {
-        SpatialHistory::Off => Changed::off(),
-        SpatialHistory::Axes => Changed::axes(grid, enough),
+        SpatialHistory::Off => ChangeMarks::off(),
+        SpatialHistory::Axes => ChangeMarks::axes(grid, enough),
         SpatialHistory::Cells => {
-            Changed::cells(grid, medium.volume().cells_of(medium.majorants().voxels()), enough)
+            ChangeMarks::cells(grid, medium.volume().cells_of(medium.majorants().voxels()), enough)
         }
     }
 }
 
 /// Light paths and view-ray segments at one time.
 struct KeptLight {
-    lights: Vec<LightPaths>,
+    lights: Vec<LightPaths<Photon>>,
     tiles: Vec<Option<SegmentTile>>,
 }
 
 impl KeptLight {
     /// Paths that were other ones in another session's lights, or were not there.
-    fn paths_differing(&self, lights: &[LightPaths]) -> usize {
-        let of_light = |light: &LightPaths| {
+    fn paths_differing(&self, lights: &[LightPaths<Photon>]) -> usize {
+        let of_light = |light: &LightPaths<Photon>| {
             let same = lights.iter().find(|other| other.stream == light.stream);
             let chunks = light.chunks.iter().enumerate();
             let differing = chunks.map(|(i, chunk)| {
@@ -349,13 +358,13 @@ impl KeptItems for KeptLight {
 }
 
 /// Sorts the photons of all lights; `radius` in voxels.
-fn sorted(scene: &Scene, radius: f32, settings: &Settings, lights: &[LightPaths]) -> PhotonMap {
+fn sorted(scene: &Scene, radius: f32, settings: &Settings, lights: &[LightPaths<Photon>]) -> PhotonMap {
     let grid = scene.medium.volume().grid();
     let cells = cells_for(scene, settings, radius);
     let radius = radius * grid.voxel_size();
     // In double precision, since world units may be anything.
     let per_volume = f64::from(radius).powi(3).recip() / f64::from(scene.medium.density());
-    let scale = |light: &LightPaths| {
+    let scale = |light: &LightPaths<Photon>| {
         let [r, g, b] = light.color().to_array().map(f64::from);
         DVec3::new(r, g, b) * (per_volume / f64::from(light.count))
     };

@@ -1,17 +1,17 @@
 //! Refinement passes: photons and rays of their own, which make the picture converge \[Knaus11\].
 
-use super::lights::{Ground, LightPaths, Plan, sources, trace};
 use super::map::PhotonMap;
-use super::settings::{Histories, Settings};
-use super::sorted;
-use super::spatial::Changed;
+use super::settings::Settings;
+use super::stored::Photon;
 use super::view::{Stretches, View};
+use super::{plan, sorted};
 use crate::film::{PixelSample, Tile};
+use crate::integrator::cells::ChangeMarks;
+use crate::integrator::light_paths::{Ground, HistoryDetail, LightPaths, Plan, Tracing, sources};
 use crate::integrator::{Limits, Stop};
 use crate::sampling::Stream;
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes};
-use std::sync::atomic::AtomicUsize;
 
 /// The photons of a pass.
 #[derive(Debug)]
@@ -20,7 +20,7 @@ pub(super) struct Pass {
     settings: Settings,
     /// Voxels.
     radius: f32,
-    lights: Vec<LightPaths>,
+    lights: Vec<LightPaths<Photon>>,
     pub map: Option<PhotonMap>,
 }
 
@@ -37,7 +37,8 @@ impl Pass {
     pub fn new(scene: &Scene, settings: &Settings, number: u32) -> Self {
         let sources = sources(scene);
         // Nothing of a pass lives through an edit.
-        let plan = Plan { histories: Histories::Paths, ..Plan::new(scene, settings, number, sources.len()) };
+        let plan =
+            Plan { histories: HistoryDetail::Paths, pass: number, ..plan(scene, settings, sources.len()) };
         let lights = sources.into_iter().map(|source| LightPaths::new(source, &plan)).collect();
         Self { number, settings: *settings, radius: settings.radius * shrunk(number), lights, map: None }
     }
@@ -47,8 +48,9 @@ impl Pass {
         if self.map.is_some() {
             return true;
         }
-        let traced = AtomicUsize::new(0);
-        let whole = trace(&mut self.lights, scene, ground, self.number, &Changed::off(), &traced, limits);
+        let marks = ChangeMarks::off();
+        let tracing = Tracing { scene, ground, pass: self.number, marks: &marks, limits };
+        let whole = tracing.trace(&mut self.lights).finished;
         if whole {
             self.map = Some(sorted(scene, self.radius, &self.settings, &self.lights));
             self.lights = Vec::new();

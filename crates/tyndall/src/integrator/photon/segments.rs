@@ -1,9 +1,10 @@
 //! View rays in segments, each by itself computed, kept and found invalid \[Jonsson12, sec. 4.3.2\].
 
-use super::spatial::Changed;
-use super::view::{Notes, OPAQUE, Stretch, Stretches, View};
+use super::view::{Notes, Stretch, Stretches, View};
 use crate::film::{PixelSample, Tile};
+use crate::integrator::cells::ChangeMarks;
 use crate::integrator::history::Histories;
+use crate::integrator::view_march::OPAQUE;
 use crate::integrator::{ItemChanges, Stop};
 use crate::math::{Ray, Rgb, cast};
 use crate::medium::{MOST_LANES, Track};
@@ -135,7 +136,7 @@ impl SegmentTile {
     }
 
     /// Forgets the segments that changes touch.
-    fn invalidate(&mut self, view: &View, pixels: &[[u32; 2]], places: &Changed) {
+    fn invalidate(&mut self, view: &View, pixels: &[[u32; 2]], places: &ChangeMarks) {
         let Some(changed) = self.changed.take() else { return };
         if !changed.is_empty() {
             for i in 0..self.len() {
@@ -232,7 +233,7 @@ fn ray_of(scene: &Scene, [x, y]: [u32; 2]) -> (Ray, Track) {
 }
 
 /// Forgets the segments of a ray that gather where photons changed.
-fn forget_near(view: &View, pixel: [u32; 2], places: &Changed, segments: &mut [Segment]) {
+fn forget_near(view: &View, pixel: [u32; 2], places: &ChangeMarks, segments: &mut [Segment]) {
     let medium = &*view.scene.medium;
     let (_, track) = ray_of(view.scene, pixel);
     let count = track.steps(view.step);
@@ -261,7 +262,7 @@ pub(super) struct Refine<'a> {
     pub tile: &'a mut Tile,
     pub groups: &'a HistoryGroups,
     pub cells: &'a [Historygram],
-    pub places: &'a Changed,
+    pub places: &'a ChangeMarks,
     pub stop: &'a Stop<'a>,
 }
 

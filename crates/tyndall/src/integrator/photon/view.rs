@@ -2,16 +2,14 @@
 
 use super::gather::Gathering;
 use super::map::PhotonMap;
+use crate::integrator::view_march::{Coverage, Shader, composite};
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::{MOST_LANES, MarchNotes, PacketMarch, Track};
+use crate::medium::{MOST_LANES, MarchNotes, PacketMarch, PacketSample, Track};
 use crate::scene::Scene;
-use crate::simd::{Lanes, one_minus_exp};
+use crate::simd::Lanes;
 use crate::transfer::{HistoryGroups, Historygram};
 use crate::volume::ValueBins;
 use fearless_simd::prelude::*;
-
-/// Transmittance below which what is behind no longer shows.
-pub(super) const OPAQUE: f32 = 1e-4;
 
 /// What a ray covers between two gathers at most, unless they lie as far apart as the settings allow: so little shows that one
 /// stands for all of it.
@@ -73,60 +71,26 @@ impl View<'_> {
         stretches: &Stretches,
         notes: &mut N,
     ) -> [Stretch; MOST_LANES] {
-        let mut radiance = [Rgb::BLACK; MOST_LANES];
-        let (zero, one) = (S::f32s::splat(simd, 0.0), S::f32s::splat(simd, 1.0));
-        let (mut alpha, mut depth) = (zero, zero);
-        let mut due = S::f32s::from_slice(simd, &stretches.due[..S::WIDTH]);
-        let spacing = self.gather_spacing * self.map.map_or(0.0, |map| map.radius);
-        let mut gathers = [0; MOST_LANES];
-        // For gathers that sort.
-        let mut distances = Vec::new();
+        let mut gathering = GatheringShader {
+            view: self,
+            rays: &stretches.rays,
+            radiance: [Rgb::BLACK; MOST_LANES],
+            gathers: [0; MOST_LANES],
+            due: S::f32s::from_slice(simd, &stretches.due[..S::WIDTH]),
+            spacing: self.gather_spacing * self.map.map_or(0.0, |map| map.radius),
+            distances: Vec::new(),
+        };
         let medium = &*self.scene.medium;
+        let mut seen = Coverage::none(simd);
         let mut march = PacketMarch::<S>::new(simd, medium, &stretches.tracks, self.step);
         let ends = |k: &[i32; MOST_LANES]| S::i32s::from_slice(simd, &k[..S::WIDTH]);
         march.go_between(ends(&stretches.from), ends(&stretches.to));
-        while let Some(sample) = march.next_noting(notes) {
-            let covered = one_minus_exp(simd, sample.thickness) * (-alpha + 1.0);
-            if medium.transfer().emits() {
-                for (lane, radiance) in radiance.iter_mut().enumerate().take(S::WIDTH) {
-                    // Lanes that take no sample may have any value.
-                    let covered = covered.as_slice()[lane];
-                    if covered > 0.0 {
-                        *radiance += medium.transfer().emitted(sample.value.as_slice()[lane]) * covered;
-                    }
-                }
-            }
-            // Gathers that a step is to have, at most one.
-            let share = (covered * (1.0 / MOST_COVERED)).max(sample.width / spacing).min(one);
-            due = covered.simd_gt(zero).select(due + share, due);
-            let now = due.simd_ge(one);
-            due = now.select(due - 1.0, due);
-            let weight = now.select(covered / share, zero);
-            let width = sample.width / share;
-            for (lane, radiance) in radiance.iter_mut().enumerate().take(S::WIDTH) {
-                let weight = weight.as_slice()[lane];
-                if weight > 0.0 {
-                    let [x, y, z] = sample.place;
-                    let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
-                    let here = Sample {
-                        place,
-                        value: sample.value.as_slice()[lane],
-                        width: width.as_slice()[lane],
-                        w_out: -stretches.rays[lane].direction,
-                        lane,
-                    };
-                    *radiance += self.scattered(simd, &here, &mut distances, notes) * weight;
-                    gathers[lane] += 1;
-                }
-            }
-            alpha += covered;
-            depth += sample.t * covered;
-            march.active &= alpha.simd_lt(S::f32s::splat(simd, 1.0 - OPAQUE));
-        }
+        composite(simd, &mut march, &mut seen, &mut gathering, notes);
+        let GatheringShader { radiance, gathers, .. } = gathering;
         let mut found = [Stretch::default(); MOST_LANES];
         for lane in 0..S::WIDTH {
-            let transmittance = 1.0 - alpha.as_slice()[lane];
-            let depth = depth.as_slice()[lane];
+            let transmittance = 1.0 - seen.alpha.as_slice()[lane];
+            let depth = seen.depth.as_slice()[lane];
             found[lane] = Stretch { radiance: radiance[lane], transmittance, depth, gathers: gathers[lane] };
         }
         found
@@ -148,6 +112,61 @@ impl View<'_> {
         let event = medium.event(place, &optics);
         let at = Gathering { place, opacity: optics.opacity, event, w_out, width, lane };
         map.scattered(simd, medium, &at, distances, notes)
+    }
+}
+
+/// Gathers photons along view rays, as often as it pays, and adds what matter emits.
+struct GatheringShader<'a, S: Lanes> {
+    view: &'a View<'a>,
+    rays: &'a [Ray; MOST_LANES],
+    radiance: [Rgb; MOST_LANES],
+    gathers: [usize; MOST_LANES],
+    /// Share of a gather that is due.
+    due: S::f32s,
+    /// World units between two gathers at most.
+    spacing: f32,
+    /// For gathers that sort.
+    distances: Vec<f32>,
+}
+
+impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
+    #[inline(always)]
+    fn shade(&mut self, simd: S, sample: &PacketSample<S>, covered: S::f32s, notes: &mut N) -> bool {
+        let (zero, one) = (S::f32s::splat(simd, 0.0), S::f32s::splat(simd, 1.0));
+        let medium = &*self.view.scene.medium;
+        if medium.transfer().emits() {
+            for (lane, radiance) in self.radiance.iter_mut().enumerate().take(S::WIDTH) {
+                // Lanes that take no sample may have any value.
+                let covered = covered.as_slice()[lane];
+                if covered > 0.0 {
+                    *radiance += medium.transfer().emitted(sample.value.as_slice()[lane]) * covered;
+                }
+            }
+        }
+        // Gathers that a step is to have, at most one.
+        let share = (covered * (1.0 / MOST_COVERED)).max(sample.width / self.spacing).min(one);
+        let due = covered.simd_gt(zero).select(self.due + share, self.due);
+        let now = due.simd_ge(one);
+        self.due = now.select(due - 1.0, due);
+        let weight = now.select(covered / share, zero);
+        let width = sample.width / share;
+        for lane in 0..S::WIDTH {
+            let weight = weight.as_slice()[lane];
+            if weight > 0.0 {
+                let [x, y, z] = sample.place;
+                let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
+                let here = Sample {
+                    place,
+                    value: sample.value.as_slice()[lane],
+                    width: width.as_slice()[lane],
+                    w_out: -self.rays[lane].direction,
+                    lane,
+                };
+                self.radiance[lane] += self.view.scattered(simd, &here, &mut self.distances, notes) * weight;
+                self.gathers[lane] += 1;
+            }
+        }
+        true
     }
 }
 

@@ -3,15 +3,13 @@
 use super::Settings;
 use crate::film::{PixelSample, Tile};
 use crate::integrator::Stop;
+use crate::integrator::view_march::{Coverage, OPAQUE, Shader, composite};
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::{MOST_LANES, PacketMarch, Track};
+use crate::medium::{MOST_LANES, PacketMarch, PacketSample, Track};
 use crate::scattering::Event;
 use crate::scene::Scene;
-use crate::simd::{Kernel, Lanes, Level, one_minus_exp};
+use crate::simd::{Kernel, Lanes, Level};
 use fearless_simd::prelude::*;
-
-/// Transmittance below which what is behind no longer shows.
-const OPAQUE: f32 = 1e-4;
 
 /// The ray marcher with its fixed points on lights.
 #[derive(Clone, Debug)]
@@ -64,58 +62,16 @@ impl RayMarch {
     /// Marches a packet to its end, or for one shaded point at least when told to stop; gives whether it has ended.
     #[inline(always)]
     fn go_on<S: Lanes>(&self, simd: S, scene: &Scene, packet: &mut Packet, stop: &Stop) -> bool {
-        let medium = &*scene.medium;
-        let shines = scene.render.max_scatter > 0;
-        let glowing = if medium.transfer().emits() { packet.count } else { 0 };
-        let most = S::f32s::splat(simd, 1.0 - OPAQUE);
-        let mut alpha = S::f32s::from_slice(simd, &packet.alpha[..S::WIDTH]);
-        let mut depth = S::f32s::from_slice(simd, &packet.depth[..S::WIDTH]);
-        let mut march = PacketMarch::<S>::new(simd, medium, &packet.tracks, self.step);
+        let mut seen = Coverage {
+            alpha: S::f32s::from_slice(simd, &packet.alpha[..S::WIDTH]),
+            depth: S::f32s::from_slice(simd, &packet.depth[..S::WIDTH]),
+        };
+        let mut march = PacketMarch::<S>::new(simd, &scene.medium, &packet.tracks, self.step);
         march.go_to(S::i32s::from_slice(simd, &packet.k[..S::WIDTH]));
-        march.active &= alpha.simd_lt(most);
-        let mut moved = false;
-        loop {
-            let k = march.step();
-            let Some(sample) = march.next() else { break };
-            // The sum of all shares so far leaves this transmittance.
-            let covered = one_minus_exp(simd, sample.thickness) * (-alpha + 1.0);
-            if shines {
-                for lane in packet.shaded..packet.count {
-                    let covered = covered.as_slice()[lane];
-                    if covered <= 0.0 {
-                        continue;
-                    }
-                    if moved && stop.reached() {
-                        // The same sample comes again, of which some lanes are shaded already.
-                        packet.shaded = lane;
-                        packet.keep::<S>(k, alpha, depth);
-                        return false;
-                    }
-                    let [x, y, z] = sample.place;
-                    let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
-                    let w_out = -packet.rays[lane].direction;
-                    let source = self.source(simd, scene, place, sample.value.as_slice()[lane], w_out);
-                    packet.radiance[lane] += source * covered;
-                    moved = true;
-                }
-            } else {
-                if moved && stop.reached() {
-                    packet.keep::<S>(k, alpha, depth);
-                    return false;
-                }
-                for lane in 0..glowing {
-                    let emitted = medium.transfer().emitted(sample.value.as_slice()[lane]);
-                    packet.radiance[lane] += emitted * covered.as_slice()[lane];
-                }
-                moved = true;
-            }
-            packet.shaded = 0;
-            alpha += covered;
-            depth += sample.t * covered;
-            march.active &= alpha.simd_lt(most);
-        }
-        packet.keep::<S>(march.step(), alpha, depth);
-        true
+        let mut shader = DirectShader { raymarch: self, scene, packet, stop, moved: false };
+        let stopped = composite(simd, &mut march, &mut seen, &mut shader, &mut ());
+        packet.keep::<S>(stopped.unwrap_or(march.step()), &seen);
+        stopped.is_none()
     }
 
     /// What a point adds to a ray that goes along `w_out`, per unit of extinction.
@@ -147,6 +103,55 @@ impl RayMarch {
             }
         }
         sum
+    }
+}
+
+/// Adds what matter emits and what it scatters of the lights to a packet's rays.
+struct DirectShader<'a> {
+    raymarch: &'a RayMarch,
+    scene: &'a Scene,
+    packet: &'a mut Packet,
+    stop: &'a Stop<'a>,
+    /// Whether a point has been shaded since the march went on, so that it gets on however often it is told to stop.
+    moved: bool,
+}
+
+impl<S: Lanes> Shader<S, ()> for DirectShader<'_> {
+    #[inline(always)]
+    fn shade(&mut self, simd: S, sample: &PacketSample<S>, covered: S::f32s, _: &mut ()) -> bool {
+        let Self { raymarch, scene, packet, stop, moved } = self;
+        let transfer = scene.medium.transfer();
+        if scene.render.max_scatter > 0 {
+            for lane in packet.shaded..packet.count {
+                let covered = covered.as_slice()[lane];
+                if covered <= 0.0 {
+                    continue;
+                }
+                if *moved && stop.reached() {
+                    // The same sample comes again, of which some lanes are shaded already.
+                    packet.shaded = lane;
+                    return false;
+                }
+                let [x, y, z] = sample.place;
+                let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
+                let w_out = -packet.rays[lane].direction;
+                let source = raymarch.source(simd, scene, place, sample.value.as_slice()[lane], w_out);
+                packet.radiance[lane] += source * covered;
+                *moved = true;
+            }
+        } else {
+            if *moved && stop.reached() {
+                return false;
+            }
+            let glowing = if transfer.emits() { packet.count } else { 0 };
+            for lane in 0..glowing {
+                let emitted = transfer.emitted(sample.value.as_slice()[lane]);
+                packet.radiance[lane] += emitted * covered.as_slice()[lane];
+            }
+            *moved = true;
+        }
+        packet.shaded = 0;
+        true
     }
 }
 
@@ -188,10 +193,10 @@ impl Packet {
 
     /// Where the march stands, and what it has met.
     #[inline(always)]
-    fn keep<S: Lanes>(&mut self, k: S::i32s, alpha: S::f32s, depth: S::f32s) {
+    fn keep<S: Lanes>(&mut self, k: S::i32s, seen: &Coverage<S>) {
         k.store_slice(&mut self.k[..S::WIDTH]);
-        alpha.store_slice(&mut self.alpha[..S::WIDTH]);
-        depth.store_slice(&mut self.depth[..S::WIDTH]);
+        seen.alpha.store_slice(&mut self.alpha[..S::WIDTH]);
+        seen.depth.store_slice(&mut self.depth[..S::WIDTH]);
     }
 
     /// What a ray has found in the end.

@@ -1,36 +1,43 @@
-//! The photon pass: light paths, each of whose interactions knows what it depends on \[Jonsson12, sec. 3.2, 4.3.1\].
+//! Light paths, each of whose vertices knows what it depends on \[Jonsson12, sec. 3.2, 4.3.1\].
 
 use crate::integrator::Stop;
+use crate::integrator::cells::Positioned;
 use crate::integrator::history::{Histories, Past, Reading};
 use crate::light::{Emission, Enclosure, Light};
-use crate::math::{PackedDirection, Ray, Rgb, Vec3};
+use crate::math::{Ray, Rgb, Vec3};
 use crate::medium::Medium;
 use crate::sampling::LightPathSampler;
 use crate::scene::Scene;
 use crate::transfer::Historygram;
-use bytemuck::{Pod, Zeroable};
+use bytemuck::Pod;
+use std::fmt::Debug;
+
+/// What a method stores where a light path interacts with matter. A path can go on from it.
+pub(crate) trait Vertex: Positioned + Pod + Debug + PartialEq {
+    /// Light that arrives at an interaction.
+    fn new(arrival: &Arrival) -> Self;
+
+    /// In which the light travels.
+    fn direction(&self) -> Vec3;
+
+    /// Flux per unit of its light's colour, times the paths of that light: of this vertex and of those left out like it.
+    fn flux(&self) -> Rgb;
+}
 
 /// Light that arrives where it interacts with matter.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Photon {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Arrival {
     /// Index space.
-    pub place: [f32; 3],
+    pub position: Vec3,
     /// In which it travels.
-    pub direction: PackedDirection,
-    /// Flux per unit of its light's colour, times the paths of that light: of this interaction and those left out like it.
-    pub flux: [f32; 3],
+    pub direction: Vec3,
+    /// As [`Vertex::flux`].
+    pub flux: Rgb,
 }
 
 /// So many interactions of a path are all kept, and of the later ones fewer and fewer, with the flux of those left out: the
 /// light of long paths is spread so widely that more would cost memory and no noise.
 const WHOLE: u32 = 4;
-
-impl Photon {
-    pub fn index_place(&self) -> Vec3 {
-        Vec3::from_array(self.place)
-    }
-}
 
 /// Chance of an interaction being kept, by the scatterings before it.
 fn chance(bounce: u32) -> f32 {
@@ -50,7 +57,7 @@ pub(super) fn bounce_of(numbers: &LightPathSampler, kept: usize) -> u32 {
 
 /// Interactions of a path that are kept on average if none is absorbed: of `max_scatter` the first few, and of the others the
 /// sum of their chances.
-pub(super) fn most_kept(max_scatter: u32) -> f64 {
+pub(crate) fn most_kept(max_scatter: u32) -> f64 {
     let whole = f64::from(WHOLE);
     let last = f64::from(max_scatter);
     if last <= whole { last } else { whole * (1.0 + (last / whole).ln()) }
@@ -58,32 +65,32 @@ pub(super) fn most_kept(max_scatter: u32) -> f64 {
 
 /// What light paths start from.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Source<'a> {
+pub(crate) enum Source<'a> {
     Light(&'a Light),
     Matter(&'a Emission),
 }
 
-/// Interactions of paths, one path after the other, with what each depends on.
+/// Vertices of paths, one path after the other, with what each depends on.
 #[derive(Clone, Debug)]
-pub(super) struct Interactions {
-    pub photons: Vec<Photon>,
+pub(super) struct Vertices<V> {
+    pub stored: Vec<V>,
     /// Of each, for flight and scattering; `None` where paths have one alone.
     pasts: Option<[Histories; 2]>,
 }
 
-impl Interactions {
+impl<V: Vertex> Vertices<V> {
     /// None yet.
     pub fn new(groups: u8, each_has_a_past: bool) -> Self {
         let pasts = each_has_a_past.then(|| [Histories::new(groups), Histories::new(groups)]);
-        Self { photons: Vec::new(), pasts }
+        Self { stored: Vec::new(), pasts }
     }
 
-    /// Whether each interaction has a past of its own.
+    /// Whether each vertex has a past of its own.
     pub fn have_pasts(&self) -> bool {
         self.pasts.is_some()
     }
 
-    /// What an interaction depends on; `None` where that is not known apart from its path.
+    /// What a vertex depends on; `None` where that is not known apart from its path.
     #[inline]
     pub fn past(&self, i: usize) -> Option<Past> {
         let [flight, scatter] = self.pasts.as_ref()?;
@@ -91,8 +98,8 @@ impl Interactions {
     }
 
     #[inline]
-    fn push(&mut self, photon: Photon, past: &Past) {
-        self.photons.push(photon);
+    fn push(&mut self, vertex: V, past: &Past) {
+        self.stored.push(vertex);
         if let Some([flight, scatter]) = &mut self.pasts {
             flight.push(past.flight);
             scatter.push(past.scatter);
@@ -101,22 +108,22 @@ impl Interactions {
 
     /// Appends some of another's.
     pub fn extend(&mut self, other: &Self, range: std::ops::Range<usize>) {
-        self.photons.extend_from_slice(&other.photons[range.clone()]);
+        self.stored.extend_from_slice(&other.stored[range.clone()]);
         if let (Some([flight, scatter]), Some([of_flight, of_scatter])) = (&mut self.pasts, &other.pasts) {
             flight.extend(of_flight, range.clone());
             scatter.extend(of_scatter, range);
         }
     }
 
-    /// Lets go of room that is not needed.
+    /// Releases memory that is not needed.
     pub fn shrink_to_fit(&mut self) {
-        self.photons.shrink_to_fit();
+        self.stored.shrink_to_fit();
         self.pasts.iter_mut().flatten().for_each(Histories::shrink_to_fit);
     }
 
     pub fn bytes(&self) -> usize {
         let pasts = self.pasts.iter().flatten().map(Histories::bytes).sum::<usize>();
-        size_of_val(&self.photons[..]) + pasts
+        size_of_val(&self.stored[..]) + pasts
     }
 }
 
@@ -129,18 +136,18 @@ pub(super) struct Tracer<'a> {
     pub reading: &'a Reading,
 }
 
-/// Where a path goes on.
+/// The vertex from which a path goes on.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Begun {
-    pub photon: Photon,
+pub(super) struct Resumed<V> {
+    pub vertex: V,
     /// Scatterings before it.
     pub bounce: u32,
     pub past: Past,
 }
 
-/// A path on its way.
+/// A light path on its way.
 #[derive(Clone, Debug)]
-pub(super) struct Walk {
+pub(super) struct LightPath {
     /// `None` where it has ended.
     flight: Option<Flight>,
     pub past: Past,
@@ -159,43 +166,43 @@ impl Tracer<'_> {
         &self.scene.medium
     }
 
-    /// What reading the optics of a place leaves in a history.
+    /// What reading the optics at a position leaves in a history.
     #[inline(always)]
-    pub fn read_at(&self, place: Vec3) -> Historygram {
-        self.reading.of(self.medium().transfer().bins(), self.medium().volume().value(place))
+    pub fn read_at(&self, position: Vec3) -> Historygram {
+        self.reading.of(self.medium().transfer().bins(), self.medium().volume().value(position))
     }
 
-    /// A path at its beginning, or where it is to go on from one of its interactions.
+    /// A path at its beginning, or where it is to go on from one of its vertices.
     #[inline(always)]
-    pub fn begin(&self, numbers: &LightPathSampler, from: Option<Begun>) -> Walk {
+    pub fn begin<V: Vertex>(&self, numbers: &LightPathSampler, from: Option<Resumed<V>>) -> LightPath {
         let mut past = from.map_or(Past::NOTHING, |from| from.past);
         let flight = match from {
-            Some(Begun { photon, bounce, .. }) => self.scatter(&photon, bounce, numbers, &mut past),
+            Some(Resumed { vertex, bounce, .. }) => self.scatter(&vertex, bounce, numbers, &mut past),
             None => self.emit(numbers),
         };
-        Walk { flight, past }
+        LightPath { flight, past }
     }
 
-    /// Goes on to the path's end, or for one scattering at least when told to stop; gives whether it has ended. Then the walk's
+    /// Goes on to the path's end, or for one scattering at least when told to stop; gives whether it has ended. Then the path's
     /// past is what the whole path depends on: also what it did not hit.
     #[inline(always)]
-    pub fn go_on(
+    pub fn go_on<V: Vertex>(
         &self,
-        walk: &mut Walk,
+        path: &mut LightPath,
         numbers: &LightPathSampler,
-        found: &mut Interactions,
+        found: &mut Vertices<V>,
         stop: &Stop,
     ) -> bool {
-        while let Some(flight) = walk.flight.take() {
-            let Some(photon) = self.fly(&flight, numbers, &mut walk.past) else { break };
+        while let Some(flight) = path.flight.take() {
+            let Some(vertex) = self.fly::<V>(&flight, numbers, &mut path.past) else { break };
             if is_kept(numbers, flight.bounce) {
-                found.push(photon, &walk.past);
+                found.push(vertex, &path.past);
             }
             if flight.bounce + 1 >= self.scene.render.max_scatter {
                 break;
             }
-            walk.flight = self.scatter(&photon, flight.bounce, numbers, &mut walk.past);
-            if walk.flight.is_some() && stop.reached() {
+            path.flight = self.scatter(&vertex, flight.bounce, numbers, &mut path.past);
+            if path.flight.is_some() && stop.reached() {
                 return false;
             }
         }
@@ -213,7 +220,7 @@ impl Tracer<'_> {
 
     /// To where light interacts next \[Jonsson12, eq. 6\], by tracking: without bias, and cheaper than to march.
     #[inline(always)]
-    fn fly(&self, flight: &Flight, numbers: &LightPathSampler, past: &mut Past) -> Option<Photon> {
+    fn fly<V: Vertex>(&self, flight: &Flight, numbers: &LightPathSampler, past: &mut Past) -> Option<V> {
         let track = self.medium().track(&flight.ray, f32::INFINITY);
         let mut writer = self.reading.writer(self.medium(), *past);
         let first = numbers.bounce(flight.bounce).flight_depth();
@@ -221,36 +228,36 @@ impl Tracer<'_> {
         let collision = self.medium().free_flight_noting(&track, first, &mut stream, &mut writer);
         *past = writer.past;
         let collision = collision?;
-        Some(Photon {
-            place: collision.place.to_array(),
-            direction: PackedDirection::new(flight.ray.direction),
-            flux: (flight.flux / chance(flight.bounce)).to_array(),
-        })
+        Some(V::new(&Arrival {
+            position: collision.place,
+            direction: flight.ray.direction,
+            flux: flight.flux / chance(flight.bounce),
+        }))
     }
 
     /// Scatters light on, or takes it away \[Jonsson12, eq. 7\]: it survives with the chance that its brightest channel
     /// does, which depends on the place alone and not on what the path carries, so that no channel's light ends another's.
     #[inline(always)]
-    fn scatter(
+    fn scatter<V: Vertex>(
         &self,
-        photon: &Photon,
+        vertex: &V,
         bounce: u32,
         numbers: &LightPathSampler,
         past: &mut Past,
     ) -> Option<Flight> {
-        let place = photon.index_place();
-        let value = self.medium().volume().value(place);
+        let position = vertex.position();
+        let value = self.medium().volume().value(position);
         past.scatter |= self.reading.of(self.medium().transfer().bins(), value);
-        let event = self.medium().event(place, &self.medium().transfer().optics(value));
+        let event = self.medium().event(position, &self.medium().transfer().optics(value));
         let u = numbers.bounce(bounce);
-        let scattered = event.sample_adjoint(-photon.direction.unpack(), u.scatter)?;
+        let scattered = event.sample_adjoint(-vertex.direction(), u.scatter)?;
         let survival = scattered.weight.max_component().min(1.0);
         if u.roulette >= survival {
             return None;
         }
         Some(Flight {
-            ray: Ray::new(self.medium().volume().grid().index_to_world(place), scattered.direction),
-            flux: Rgb::from(photon.flux) * (scattered.weight * (chance(bounce) / survival)),
+            ray: Ray::new(self.medium().volume().grid().index_to_world(position), scattered.direction),
+            flux: vertex.flux() * (scattered.weight * (chance(bounce) / survival)),
             bounce: bounce + 1,
         })
     }

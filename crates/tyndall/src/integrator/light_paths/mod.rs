@@ -1,61 +1,87 @@
-//! The light paths of a scene: of each light equally many, so that no edit of one light changes the paths of others.
+//! Paths from the lights of a scene and from its glowing matter, generic over what a method stores at a vertex. Each light has
+//! equally many, so that no edit of one light changes the paths of others; an edit retraces those that it touched.
 
-use super::chunk::{self, Chunk, Update};
-use super::paths::{Source, Tracer};
-use super::settings::{Histories, Settings};
-use super::spatial::Changed;
+mod chunk;
+mod tracer;
+
+pub(crate) use chunk::Chunk;
+pub(crate) use tracer::{Arrival, Vertex, most_kept};
+
 use crate::integrator::Limits;
+use crate::integrator::cells::ChangeMarks;
 use crate::integrator::history::Reading;
 use crate::light::{Enclosure, Light};
 use crate::math::{Rgb, cast};
 use crate::sampling::LightPathSampler;
 use crate::scene::Scene;
 use crate::simd::Level;
+use chunk::Update;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use tracer::{Source, Tracer};
 
 /// The paths of one light.
 #[derive(Clone, Debug)]
-pub(super) struct LightPaths {
+pub(crate) struct LightPaths<V> {
     /// `None` for glowing matter.
     pub light: Option<Light>,
     /// Tells its random numbers from those of other lights.
     pub stream: u32,
-    pub chunks: Vec<Chunk>,
+    pub chunks: Vec<Chunk<V>>,
     /// Paths, also those that missed.
     pub count: u32,
 }
 
 /// What tracing needs beside the scene.
 #[derive(Debug)]
-pub(super) struct Ground {
+pub(crate) struct Ground {
     pub reading: Reading,
     pub enclosure: Enclosure,
     pub level: Level,
 }
 
+/// Which part of a path has a history of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum HistoryDetail {
+    /// Each vertex: an edit retraces a path from where it touched it.
+    Vertices,
+    /// The whole path: an edit retraces it from its beginning.
+    Paths,
+}
+
 /// What paths to make for each light.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Plan {
+pub(crate) struct Plan {
     pub count: u32,
     pub seed: u64,
     pub pass: u32,
+    /// Groups of values in a history.
     pub groups: u8,
-    pub histories: Histories,
+    pub histories: HistoryDetail,
 }
 
 impl Plan {
-    /// For so many sources: each has as many paths as the others.
-    pub fn new(scene: &Scene, settings: &Settings, pass: u32, sources: usize) -> Self {
-        Self {
-            count: (settings.photons / cast::fit_u32(sources.max(1))).max(1),
-            seed: scene.render.seed,
-            pass,
-            groups: settings.groups(),
-            histories: settings.histories,
-        }
+    /// Paths of each of so many sources, when there are `paths` in all.
+    pub fn share(paths: u32, sources: usize) -> u32 {
+        (paths / cast::fit_u32(sources.max(1))).max(1)
+    }
+}
+
+/// The random numbers of the paths of a light.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PathNumbers {
+    seed: u64,
+    pass: u32,
+    stream: u32,
+}
+
+impl PathNumbers {
+    /// Of one path.
+    #[inline(always)]
+    fn of(&self, path: u32) -> LightPathSampler {
+        LightPathSampler::new(self.seed, self.pass, self.stream, path)
     }
 }
 
@@ -64,7 +90,7 @@ const MATTER: u32 = u32::MAX;
 
 /// A scene's lights and its glowing matter, with the streams of their random numbers: by name where a light has one, so that
 /// it keeps them when others come and go; else by its number. In the order of the streams, in which photons are added up too.
-pub(super) fn sources(scene: &Scene) -> Vec<(Option<Light>, u32)> {
+pub(crate) fn sources(scene: &Scene) -> Vec<(Option<Light>, u32)> {
     let lights = scene.lights.lights();
     let mut first_of: HashMap<&str, usize> = HashMap::new();
     for (i, name) in scene.light_names.iter().enumerate() {
@@ -87,13 +113,14 @@ pub(super) fn sources(scene: &Scene) -> Vec<(Option<Light>, u32)> {
     sources
 }
 
-impl LightPaths {
+impl<V: Vertex> LightPaths<V> {
     /// Paths yet to be traced. In each block of paths that are stratified together, those that start alike come together.
     pub fn new((light, stream): (Option<Light>, u32), plan: &Plan) -> Self {
         let Plan { count, seed, pass, groups, histories } = *plan;
         const BLOCK: u32 = LightPathSampler::STRATIFIED;
+        let numbers = PathNumbers { seed, pass, stream };
         let of_block = |block: u32| {
-            let key = |path: u32| morton(LightPathSampler::new(seed, pass, stream, path).emission());
+            let key = |path: u32| morton(numbers.of(path).emission());
             let last = (block + 1).saturating_mul(BLOCK).min(count);
             let mut keys: Vec<(u32, u32)> = (block * BLOCK..last).map(|path| (key(path), path)).collect();
             keys.sort_unstable();
@@ -125,39 +152,54 @@ impl LightPaths {
     }
 }
 
-/// Traces what is not valid; false where a stop came first. Counts the paths traced.
-pub(super) fn trace(
-    lights: &mut [LightPaths],
-    scene: &Scene,
-    ground: &Ground,
-    pass: u32,
-    places: &Changed,
-    traced: &AtomicUsize,
-    limits: &Limits,
-) -> bool {
-    let seed = scene.render.seed;
-    let mut work: Vec<(&mut Chunk, Source, u32)> = Vec::new();
-    for LightPaths { light, stream, chunks, .. } in lights {
-        if let Some(source) = LightPaths::source(light.as_ref(), scene) {
-            let invalid = chunks.iter_mut().filter(|chunk| !chunk.is_valid());
-            work.extend(invalid.map(|chunk| (chunk, source, *stream)));
-        }
-    }
-    let unfinished = AtomicUsize::new(work.len());
-    work.into_par_iter().with_max_len(1).for_each(|(chunk, source, stream)| {
-        let stop = limits.stop();
-        if !stop.reached() {
-            let Ground { reading, enclosure, .. } = ground;
-            let tracer = Tracer { scene, source, enclosure, reading };
-            let numbers = |path| LightPathSampler::new(seed, pass, stream, path);
-            let update = Update { chunk: &mut *chunk, tracer, numbers: &numbers, places, stop: &stop };
-            traced.fetch_add(ground.level.run(update), Ordering::Relaxed);
-            if chunk.is_valid() {
-                unfinished.fetch_sub(1, Ordering::Relaxed);
+/// What tracing the paths of all lights needs.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tracing<'a> {
+    pub scene: &'a Scene,
+    pub ground: &'a Ground,
+    /// The refinement pass whose paths these are; 0 is what an edit keeps.
+    pub pass: u32,
+    /// Where vertices change.
+    pub marks: &'a ChangeMarks,
+    pub limits: &'a Limits<'a>,
+}
+
+/// How far tracing came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct TracingProgress {
+    /// Paths traced.
+    pub traced: usize,
+    /// Whether all paths are valid now, so that no stop came first.
+    pub finished: bool,
+}
+
+impl Tracing<'_> {
+    /// Traces the paths that are not valid.
+    pub fn trace<V: Vertex>(&self, lights: &mut [LightPaths<V>]) -> TracingProgress {
+        let Self { scene, ground: Ground { reading, enclosure, level }, pass, marks, limits } = *self;
+        let seed = scene.render.seed;
+        let mut work: Vec<(&mut Chunk<V>, Source, PathNumbers)> = Vec::new();
+        for LightPaths { light, stream, chunks, .. } in lights {
+            if let Some(source) = LightPaths::<V>::source(light.as_ref(), scene) {
+                let numbers = PathNumbers { seed, pass, stream: *stream };
+                let invalid = chunks.iter_mut().filter(|chunk| !chunk.is_valid());
+                work.extend(invalid.map(|chunk| (chunk, source, numbers)));
             }
         }
-    });
-    unfinished.into_inner() == 0
+        let (unfinished, traced) = (AtomicUsize::new(work.len()), AtomicUsize::new(0));
+        work.into_par_iter().with_max_len(1).for_each(|(chunk, source, numbers)| {
+            let stop = limits.stop();
+            if !stop.reached() {
+                let tracer = Tracer { scene, source, enclosure, reading };
+                let update = Update { chunk: &mut *chunk, tracer, numbers, marks, stop: &stop };
+                traced.fetch_add(level.run(update), Ordering::Relaxed);
+                if chunk.is_valid() {
+                    unfinished.fetch_sub(1, Ordering::Relaxed);
+                }
+            }
+        });
+        TracingProgress { traced: traced.into_inner(), finished: unfinished.into_inner() == 0 }
+    }
 }
 
 /// The place of four numbers in [0, 1) on a curve that fills their space: where numbers are alike, so are places.

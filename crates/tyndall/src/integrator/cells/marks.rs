@@ -1,19 +1,20 @@
-//! The spatial history \[Jonsson12, sec. 4.3.2\]: where photons appeared, moved or vanished, which view-ray segments ask
-//! for the places that they gather from.
+//! The spatial history \[Jonsson12, sec. 4.3.2\]: where things appeared, moved or vanished, asked for by what reads them within
+//! reach.
 
+use super::Positioned;
 use super::grid::CellGrid;
-use super::paths::Photon;
 use crate::math::Vec3;
 use crate::volume::Cells;
+use bytemuck::Pod;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
-/// Places whose photons changed, marked by many threads at once.
+/// Positions at which things changed, marked by many threads at once.
 #[derive(Debug)]
-pub(super) struct Changed {
+pub(crate) struct ChangeMarks {
     kind: Kind,
     any: AtomicBool,
-    /// Places marked, and how many make it not worth asking for one.
+    /// Positions marked, and how many make it not worth asking for one.
     marks: AtomicUsize,
     enough: usize,
 }
@@ -22,14 +23,14 @@ pub(super) struct Changed {
 enum Kind {
     /// Nobody asks.
     Off,
-    /// A bit for each cell of the grid from which a changed photon can be gathered.
+    /// A bit for each cell of the grid from which a changed thing is within reach.
     /// And one for each majorant cell, which is asked first.
     Cells { grid: CellGrid, near: Vec<AtomicU64>, coarse: Arc<Cells>, near_coarse: Vec<AtomicU64> },
     /// Of each axis 64 bits, the paper's way: saturates soon.
     Axes { grid: CellGrid, axes: [AtomicU64; 3] },
 }
 
-impl Changed {
+impl ChangeMarks {
     fn of(kind: Kind, enough: usize) -> Self {
         Self { kind, any: AtomicBool::new(false), marks: AtomicUsize::new(0), enough }
     }
@@ -46,7 +47,7 @@ impl Changed {
         Self::of(Kind::Cells { grid, near, coarse, near_coarse }, enough)
     }
 
-    /// Marks places along each axis.
+    /// Marks positions along each axis.
     pub fn axes(grid: CellGrid, enough: usize) -> Self {
         Self::of(Kind::Axes { grid, axes: Default::default() }, enough)
     }
@@ -70,42 +71,41 @@ impl Changed {
         self.any.load(Ordering::Relaxed)
     }
 
-    /// Whether so many places are marked that every place is to count as marked.
+    /// Whether so many positions are marked that every one is to count as marked.
     pub fn everywhere(&self) -> bool {
         self.marks.load(Ordering::Relaxed) > self.enough
     }
 
-    /// Marks where the interactions of a path are others than they were, or lie in matter that is.
-    pub fn mark_difference(&self, old: &[Photon], new: &[Photon], matter_changed: impl Fn(&Photon) -> bool) {
-        let same = |(old, new): (&Photon, &Photon)| {
-            bytemuck::bytes_of(old) == bytemuck::bytes_of(new) && !matter_changed(new)
-        };
+    /// Marks what is another than it was, from the first such thing on, or is to count as changed `otherwise`.
+    pub fn mark_difference<P: Positioned + Pod>(&self, old: &[P], new: &[P], otherwise: impl Fn(&P) -> bool) {
+        let same =
+            |(old, new): (&P, &P)| bytemuck::bytes_of(old) == bytemuck::bytes_of(new) && !otherwise(new);
         let same = old.iter().zip(new).take_while(|&pair| same(pair)).count();
         self.mark_all(&old[same..]);
         self.mark_all(&new[same..]);
     }
 
-    /// Marks where photons are.
-    pub fn mark_all(&self, photons: &[Photon]) {
-        if matches!(self.kind, Kind::Off) || photons.is_empty() {
+    /// Marks where things are.
+    pub fn mark_all(&self, things: &[impl Positioned]) {
+        if matches!(self.kind, Kind::Off) || things.is_empty() {
             return;
         }
         self.any.store(true, Ordering::Relaxed);
-        if self.marks.fetch_add(photons.len(), Ordering::Relaxed) <= self.enough {
-            photons.iter().for_each(|photon| self.mark(photon.index_place()));
+        if self.marks.fetch_add(things.len(), Ordering::Relaxed) <= self.enough {
+            things.iter().for_each(|thing| self.mark(thing.position()));
         }
     }
 
-    /// Marks a place of index space.
-    fn mark(&self, place: Vec3) {
+    /// Marks a position in index space.
+    fn mark(&self, position: Vec3) {
         match &self.kind {
             Kind::Off => {}
             Kind::Cells { grid, near, coarse, near_coarse } => {
-                grid.neighbours(grid.cell(grid.to_metric(place))).for_each(|i| set(near, i));
-                coarse.cells_within(place, grid.index_reach()).for_each(|i| set(near_coarse, i));
+                grid.neighbours(grid.cell(grid.to_metric(position))).for_each(|i| set(near, i));
+                coarse.cells_within(position, grid.index_reach()).for_each(|i| set(near_coarse, i));
             }
             Kind::Axes { grid, axes } => {
-                let bins = grid.axis_bins(grid.to_metric(place));
+                let bins = grid.axis_bins(grid.to_metric(position));
                 for (axis, bin) in axes.iter().zip(bins) {
                     axis.fetch_or(1 << bin, Ordering::Relaxed);
                 }
@@ -113,7 +113,7 @@ impl Changed {
         }
     }
 
-    /// Whether a gather somewhere in a majorant cell may meet a marked place.
+    /// Whether something marked may be within reach of a majorant cell.
     #[inline]
     pub fn near_cell(&self, cell: usize) -> bool {
         match &self.kind {
@@ -123,14 +123,14 @@ impl Changed {
         }
     }
 
-    /// Whether a gather at a place of index space may meet a marked one.
+    /// Whether something marked may be within reach of a position in index space.
     #[inline]
-    pub fn near(&self, place: Vec3) -> bool {
+    pub fn near(&self, position: Vec3) -> bool {
         match &self.kind {
             Kind::Off => false,
-            Kind::Cells { grid, near, .. } => is_set(near, grid.number(grid.cell(grid.to_metric(place)))),
+            Kind::Cells { grid, near, .. } => is_set(near, grid.number(grid.cell(grid.to_metric(position)))),
             Kind::Axes { grid, axes } => {
-                let masks = grid.axis_reach(grid.to_metric(place));
+                let masks = grid.axis_reach(grid.to_metric(position));
                 axes.iter().zip(masks).all(|(axis, mask)| axis.load(Ordering::Relaxed) & mask != 0)
             }
         }

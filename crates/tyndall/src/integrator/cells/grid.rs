@@ -17,7 +17,7 @@ const AXIS_BITS: f32 = 64.0;
 /// Cells over the medium's box in *metric* space: the world about the box's middle, in units of the radius, which keeps numbers
 /// near 1 whatever the world's unit is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct CellGrid {
+pub(crate) struct CellGrid {
     middle: Vec3,
     linear: Mat3,
     origin: Vec3,

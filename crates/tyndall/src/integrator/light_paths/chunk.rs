@@ -1,13 +1,12 @@
 //! Some hundred paths of one light that start near each other: traced together, so that they read the same matter, and
 //! traced again where an edit touched them.
 
-use super::paths::{Begun, Interactions, Photon, Tracer, Walk, bounce_of};
-use super::settings;
-use super::spatial::Changed;
+use super::tracer::{LightPath, Resumed, Tracer, Vertex, Vertices, bounce_of};
+use super::{HistoryDetail, PathNumbers};
 use crate::integrator::Stop;
+use crate::integrator::cells::ChangeMarks;
 use crate::integrator::history::{Histories, Past};
 use crate::math::cast;
-use crate::sampling::LightPathSampler;
 use crate::simd::{Kernel, Lanes};
 use std::ops::Range;
 
@@ -16,39 +15,39 @@ pub(super) const PATHS: usize = 1024;
 
 /// Paths of one light, with their interactions and what both depend on.
 #[derive(Clone, Debug)]
-pub(super) struct Chunk {
+pub(crate) struct Chunk<V> {
     /// Numbers of the paths among those of their light.
     paths: Vec<u32>,
     /// All of them, or none yet.
-    traced: Traced,
+    traced: Traced<V>,
     /// What has changed since they were traced.
     changed: Past,
     /// What is to take their place, when a stop came before all were traced again.
-    underway: Option<Box<Underway>>,
+    underway: Option<Box<Underway<V>>>,
 }
 
 /// Paths that have been traced, from the first on.
 #[derive(Clone, Debug)]
-struct Traced {
+struct Traced<V> {
     /// Where each path's interactions end.
     ends: Vec<u32>,
     /// What each path as a whole depends on.
     flight: Histories,
     scatter: Histories,
-    interactions: Interactions,
+    vertices: Vertices<V>,
 }
 
 /// Paths that have been traced again, and the next one on its way.
 #[derive(Clone, Debug)]
-struct Underway {
-    traced: Traced,
-    walk: Option<Walk>,
+struct Underway<V> {
+    traced: Traced<V>,
+    path: Option<LightPath>,
 }
 
-impl Traced {
+impl<V: Vertex> Traced<V> {
     fn new(groups: u8, each_has_a_past: bool) -> Self {
         let (flight, scatter) = (Histories::new(groups), Histories::new(groups));
-        Self { ends: Vec::new(), flight, scatter, interactions: Interactions::new(groups, each_has_a_past) }
+        Self { ends: Vec::new(), flight, scatter, vertices: Vertices::new(groups, each_has_a_past) }
     }
 
     fn range(&self, path: usize) -> Range<usize> {
@@ -65,7 +64,7 @@ impl Traced {
     fn valid(&self, path: usize, changed: &Past) -> Range<usize> {
         let whole = self.range(path);
         let is_valid = |past: Past| !past.meets(changed);
-        let valid = whole.clone().rev().find(|&i| self.interactions.past(i).is_some_and(is_valid));
+        let valid = whole.clone().rev().find(|&i| self.vertices.past(i).is_some_and(is_valid));
         whole.start..valid.map_or(whole.start, |i| i + 1)
     }
 
@@ -73,7 +72,7 @@ impl Traced {
     fn end(&mut self, past: &Past) {
         self.flight.push(past.flight);
         self.scatter.push(past.scatter);
-        self.ends.push(cast::fit_u32(self.interactions.photons.len()));
+        self.ends.push(cast::fit_u32(self.vertices.stored.len()));
     }
 
     /// Lets go of room that is not needed.
@@ -81,20 +80,20 @@ impl Traced {
         self.ends.shrink_to_fit();
         self.flight.shrink_to_fit();
         self.scatter.shrink_to_fit();
-        self.interactions.shrink_to_fit();
+        self.vertices.shrink_to_fit();
     }
 }
 
-impl Chunk {
+impl<V: Vertex> Chunk<V> {
     /// Paths yet to be traced.
-    pub fn new(paths: Vec<u32>, groups: u8, histories: settings::Histories) -> Self {
-        let traced = Traced::new(groups, histories == settings::Histories::Interactions);
+    pub fn new(paths: Vec<u32>, groups: u8, histories: HistoryDetail) -> Self {
+        let traced = Traced::new(groups, histories == HistoryDetail::Vertices);
         Self { paths, traced, changed: Past::NOTHING, underway: None }
     }
 
-    /// The interactions, path by path.
-    pub fn photons(&self) -> &[Photon] {
-        &self.traced.interactions.photons
+    /// The vertices, path by path.
+    pub fn vertices(&self) -> &[V] {
+        &self.traced.vertices.stored
     }
 
     /// Paths in it.
@@ -121,15 +120,15 @@ impl Chunk {
 
     /// Bytes kept for the paths themselves, and for their interactions.
     pub fn bytes(&self) -> [usize; 2] {
-        let Traced { ends, flight, scatter, interactions } = &self.traced;
+        let Traced { ends, flight, scatter, vertices } = &self.traced;
         let histories = flight.bytes() + scatter.bytes();
-        [size_of_val(&self.paths[..]) + size_of_val(&ends[..]) + histories, interactions.bytes()]
+        [size_of_val(&self.paths[..]) + size_of_val(&ends[..]) + histories, vertices.bytes()]
     }
 
     /// Paths that are other ones in another chunk of the same paths, or were not traced there.
     pub fn differing(&self, other: &Self) -> usize {
-        let photons = |chunk: &Self, path| {
-            bytemuck::cast_slice::<_, u8>(&chunk.photons()[chunk.traced.range(path)]).to_vec()
+        let vertices = |chunk: &Self, path| {
+            bytemuck::cast_slice::<_, u8>(&chunk.vertices()[chunk.traced.range(path)]).to_vec()
         };
         if !self.is_traced() {
             return 0;
@@ -137,65 +136,63 @@ impl Chunk {
         if !other.is_traced() || self.paths != other.paths {
             return self.len();
         }
-        (0..self.len()).filter(|&path| photons(self, path) != photons(other, path)).count()
+        (0..self.len()).filter(|&path| vertices(self, path) != vertices(other, path)).count()
     }
 }
 
 /// Traces the paths of a chunk that are not valid, each on from its last valid interaction, unless a stop comes first; gives
 /// how many.
-pub(super) struct Update<'a> {
-    pub chunk: &'a mut Chunk,
+pub(super) struct Update<'a, V> {
+    pub chunk: &'a mut Chunk<V>,
     pub tracer: Tracer<'a>,
     /// The numbers of a path.
-    pub numbers: &'a dyn Fn(u32) -> LightPathSampler,
-    /// Where interactions changed.
-    pub places: &'a Changed,
+    pub numbers: PathNumbers,
+    /// Where vertices changed.
+    pub marks: &'a ChangeMarks,
     pub stop: &'a Stop<'a>,
 }
 
-impl Kernel for Update<'_> {
+impl<V: Vertex> Kernel for Update<'_, V> {
     type Output = usize;
 
     #[inline(always)]
     fn run<S: Lanes>(self, _: S) -> usize {
-        let Self { chunk, tracer, numbers, places, stop } = self;
+        let Self { chunk, tracer, numbers, marks, stop } = self;
         let (old, changed, was_traced) = (&chunk.traced, &chunk.changed, chunk.is_traced());
         let touched = |path: usize| !was_traced || old.past(path).meets(changed);
         let mut retraced = 0;
         if (0..chunk.len()).any(touched) {
             let groups = tracer.reading.groups.count();
-            let begin =
-                || Underway { traced: Traced::new(groups, old.interactions.have_pasts()), walk: None };
+            let begin = || Underway { traced: Traced::new(groups, old.vertices.have_pasts()), path: None };
             let mut next = chunk.underway.take().map_or_else(begin, |underway| *underway);
             for path in next.traced.ends.len()..chunk.len() {
-                let (new, numbers) = (&mut next.traced, numbers(chunk.paths[path]));
+                let (new, numbers) = (&mut next.traced, numbers.of(chunk.paths[path]));
                 if !touched(path) {
-                    new.interactions.extend(&old.interactions, old.range(path));
+                    new.vertices.extend(&old.vertices, old.range(path));
                     new.end(&old.past(path));
                     continue;
                 }
                 let (kept, of_old) =
                     if was_traced { (old.valid(path, changed), old.range(path)) } else { (0..0, 0..0) };
-                let mut walk = next.walk.take().unwrap_or_else(|| {
-                    new.interactions.extend(&old.interactions, kept.clone());
+                let mut light_path = next.path.take().unwrap_or_else(|| {
+                    new.vertices.extend(&old.vertices, kept.clone());
                     let from = kept.clone().last().and_then(|i| {
-                        let (photon, past) = (old.interactions.photons[i], old.interactions.past(i)?);
-                        Some(Begun { photon, bounce: bounce_of(&numbers, i - kept.start), past })
+                        let (vertex, past) = (old.vertices.stored[i], old.vertices.past(i)?);
+                        Some(Resumed { vertex, bounce: bounce_of(&numbers, i - kept.start), past })
                     });
                     tracer.begin(&numbers, from)
                 });
-                if !tracer.go_on(&mut walk, &numbers, &mut new.interactions, stop) {
-                    next.walk = Some(walk);
+                if !tracer.go_on(&mut light_path, &numbers, &mut new.vertices, stop) {
+                    next.path = Some(light_path);
                     chunk.underway = Some(Box::new(next));
                     return retraced;
                 }
                 // A gather weighs photons by the opacity where they are.
-                let matter_changed =
-                    |photon: &Photon| tracer.read_at(photon.index_place()).meets(changed.flight);
+                let matter_changed = |vertex: &V| tracer.read_at(vertex.position()).meets(changed.flight);
                 let first = new.ends.last().map_or(0, |&end| end as usize) + kept.len();
-                let of_old = &old.interactions.photons[kept.end..of_old.end];
-                places.mark_difference(of_old, &new.interactions.photons[first..], matter_changed);
-                new.end(&walk.past);
+                let of_old = &old.vertices.stored[kept.end..of_old.end];
+                marks.mark_difference(of_old, &new.vertices.stored[first..], matter_changed);
+                new.end(&light_path.past);
                 retraced += 1;
             }
             next.traced.shrink_to_fit();

@@ -1,0 +1,59 @@
+//! Marching view rays through matter, front to back: how much each step covers, and when nothing behind it shows.
+
+use crate::medium::{MarchNotes, PacketMarch, PacketSample};
+use crate::simd::{Lanes, one_minus_exp};
+use fearless_simd::prelude::*;
+
+/// Transmittance below which what is behind no longer shows.
+pub(crate) const OPAQUE: f32 = 1e-4;
+
+/// What a packet of view rays has met so far, one ray per lane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Coverage<S: Lanes> {
+    /// 1 - transmittance.
+    pub alpha: S::f32s,
+    /// Sum of the distances inside the medium, weighted by what they add to `alpha`.
+    pub depth: S::f32s,
+}
+
+impl<S: Lanes> Coverage<S> {
+    /// Nothing met yet.
+    #[inline(always)]
+    pub fn none(simd: S) -> Self {
+        let zero = S::f32s::splat(simd, 0.0);
+        Self { alpha: zero, depth: zero }
+    }
+}
+
+/// What finds the light that a packet's samples send along their rays.
+pub(crate) trait Shader<S: Lanes, N> {
+    /// Shades a sample of each ray, of which the viewer sees the share `covered`, 0 in lanes that take none; false to stop
+    /// before the samples count.
+    fn shade(&mut self, simd: S, sample: &PacketSample<S>, covered: S::f32s, notes: &mut N) -> bool;
+}
+
+/// Marches until all rays have ended or are opaque. Where the shader stops the march, gives the steps to go on with, whose
+/// samples come again then.
+#[inline(always)]
+pub(crate) fn composite<S: Lanes, N: MarchNotes<S>, H: Shader<S, N>>(
+    simd: S,
+    march: &mut PacketMarch<S>,
+    seen: &mut Coverage<S>,
+    shader: &mut H,
+    notes: &mut N,
+) -> Option<S::i32s> {
+    let most = S::f32s::splat(simd, 1.0 - OPAQUE);
+    march.active &= seen.alpha.simd_lt(most);
+    loop {
+        let k = march.step();
+        let sample = march.next(notes)?;
+        // The sum of all shares so far leaves this transmittance.
+        let covered = one_minus_exp(simd, sample.thickness) * (-seen.alpha + 1.0);
+        if !shader.shade(simd, &sample, covered, notes) {
+            return Some(k);
+        }
+        seen.alpha += covered;
+        seen.depth += sample.t * covered;
+        march.active &= seen.alpha.simd_lt(most);
+    }
+}
