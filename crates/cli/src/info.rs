@@ -11,7 +11,7 @@ use tyndall::transfer::Preset;
 use tyndall::volume::procedural::MATERIALS;
 use tyndall::volume::{Space, Volume};
 use tyndall_live::document::FieldKind;
-use tyndall_live::{Input, Loaded, Options, Source};
+use tyndall_live::{Input, LoadedScene, Options, Source};
 
 /// Bins of the histogram.
 const BINS: usize = 256;
@@ -23,7 +23,7 @@ pub fn run(options: &InfoOptions) -> Result<(), Failure> {
     on.threads.install(|| tell(&loaded, options.json))
 }
 
-fn tell(loaded: &Loaded, as_json: bool) -> Result<(), Failure> {
+fn tell(loaded: &LoadedScene, as_json: bool) -> Result<(), Failure> {
     let (volume, source) = (&*loaded.assets.volume, &loaded.source);
     if as_json {
         return say(&format!("{:#}\n", to_json(volume, source)));

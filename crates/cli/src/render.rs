@@ -20,7 +20,7 @@ const SLICE: Duration = Duration::from_millis(100);
 const ERROR_EVERY: Duration = Duration::from_millis(500);
 
 /// When to stop.
-struct Stop {
+struct StopConditions {
     samples: u32,
     time: Option<Duration>,
     error: Option<f64>,
@@ -63,7 +63,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
 
     let samples = live.document().render.samples;
     let limited = options.time.is_some() || options.target_error.is_some();
-    let stop = Stop {
+    let stop = StopConditions {
         samples: if limited && options.samples.is_none() { u32::MAX } else { samples },
         time: options.time,
         error: options.target_error,
@@ -116,7 +116,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
 }
 
 /// Refines slice by slice until a stop is met, showing how far it is.
-fn refine(live: &mut LiveSession, stop: &Stop, cancel: &Arc<AtomicBool>, mut display: Display) {
+fn refine(live: &mut LiveSession, stop: &StopConditions, cancel: &Arc<AtomicBool>, mut display: Display) {
     let begun = Instant::now();
     // A time that the clock cannot count to never comes.
     let end = stop.time.and_then(|time| begun.checked_add(time));

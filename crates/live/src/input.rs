@@ -27,7 +27,7 @@ pub struct Input {
 
 /// A checked document with all that it names, from which a session starts.
 #[derive(Clone, Debug)]
-pub struct Loaded {
+pub struct LoadedScene {
     /// The document.
     pub document: Document,
     /// What it names.
@@ -104,7 +104,7 @@ impl Input {
     ///
     /// # Errors
     /// [`LiveError`] with what is wrong with the document or the files.
-    pub fn load(self, options: &Options) -> Result<Loaded, LiveError> {
+    pub fn load(self, options: &Options) -> Result<LoadedScene, LiveError> {
         let Self { mut value, folder, bare, name, mut notes } = self;
         let in_document = |source| LiveError::Document { at: name.clone(), source };
         notes.extend(document::move_old_keys(&mut value).map_err(in_document)?);
@@ -123,7 +123,7 @@ impl Input {
                 value = document::apply(&value, &json!({ "medium": { "density": document.medium.density } }));
             }
         }
-        Ok(Loaded { document, assets, source, value, folder, name, notes })
+        Ok(LoadedScene { document, assets, source, value, folder, name, notes })
     }
 }
 

@@ -45,6 +45,6 @@ mod undo;
 pub use assets::{Assets, Source};
 pub use build::{Built, SceneError};
 pub use error::LiveError;
-pub use input::{Input, Loaded, read_text};
+pub use input::{Input, LoadedScene, read_text};
 pub use session::{EditReport, LiveSession, Options};
 pub use tyndall::session::{Budget, Progress};

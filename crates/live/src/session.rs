@@ -5,7 +5,7 @@ use crate::assets::{self, Assets, Source};
 use crate::build::Built;
 use crate::document::{self, Document};
 use crate::error::LiveError;
-use crate::input::{Input, Loaded, of_assets};
+use crate::input::{Input, LoadedScene, of_assets};
 use crate::undo::UndoList;
 use serde_json::Value;
 use std::borrow::Cow;
@@ -90,8 +90,8 @@ impl LiveSession {
     ///
     /// # Errors
     /// As [`Self::open`].
-    pub fn of(loaded: Loaded, options: Options) -> Result<Self, LiveError> {
-        let Loaded { document, assets, source, value, folder, name: at, notes: told } = loaded;
+    pub fn of(loaded: LoadedScene, options: Options) -> Result<Self, LiveError> {
+        let LoadedScene { document, assets, source, value, folder, name: at, notes: told } = loaded;
         let built = Self::build(document, assets, &options, &at)?;
         let session = session_of(&built.scene, &options);
         let of_source = source.notes.iter().cloned();

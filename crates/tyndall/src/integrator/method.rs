@@ -227,7 +227,7 @@ pub struct MethodReport {
     /// Further counts that benches ask for.
     pub counts: Vec<NamedCount>,
     /// What the time goes into that passes: before samples are taken, and while they are. The first may be nothing.
-    pub stages: Stages,
+    pub stages: StageNames,
 }
 
 /// The share of a kind of work item that was computed.
@@ -269,14 +269,14 @@ pub struct NamedCount {
 
 /// Names of the two stages of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stages {
+pub struct StageNames {
     /// What is made before samples are taken; `None` where that is nothing.
     pub preparation: Option<&'static str>,
     /// What samples are taken of.
     pub sampling: &'static str,
 }
 
-impl Default for Stages {
+impl Default for StageNames {
     fn default() -> Self {
         Self { preparation: None, sampling: PIXELS }
     }

@@ -16,11 +16,14 @@ pub mod path;
 pub mod photon;
 pub mod raymarch;
 
+#[cfg(test)]
+mod plain;
+
 pub(crate) use engine::Engine;
 pub use engine::MethodEntry;
 pub use method::{
     Edited, ItemChanges, KeptCount, KeptItems, MemoryNeed, Method, MethodReport, MovedKey, NamedCount,
-    PixelCounts, Resources, SettingProblem, Stages, WorkShare,
+    PixelCounts, Resources, SettingProblem, StageNames, WorkShare,
 };
 pub use stop::{Limits, Stop};
 
@@ -31,6 +34,8 @@ pub static METHODS: &[MethodEntry] = &[
     MethodEntry::of::<raymarch::RayMarch>(),
     MethodEntry::of::<path::PathTracer>(),
     MethodEntry::of::<photon::PhotonMapper>(),
+    #[cfg(test)]
+    MethodEntry::of::<plain::Plain>(),
 ];
 
 /// The method of a scene that names none: unbiased, the truth that others are held against.

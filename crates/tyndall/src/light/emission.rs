@@ -3,7 +3,7 @@
 use super::{Emitted, LightSample, Target};
 use crate::math::{Bounds, Ray, Rgb, Vec3};
 use crate::medium::Medium;
-use crate::sampling::{Discrete, Stream, warp};
+use crate::sampling::{Choice, Discrete, Stream, warp};
 use crate::volume::Cells;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -155,7 +155,7 @@ impl Emission {
 
     /// The place `u` in a cell chosen by power, if it glows.
     fn glow(&self, medium: &Medium, choice: f32, u: Vec3) -> Option<Glow> {
-        let (i, chance, _) = self.cells.sample(choice);
+        let Choice { index: i, probability: chance, .. } = self.cells.sample(choice);
         let b = &self.glowing.bounds[i];
         let place = b.min + b.size() * u;
         if !medium.contains(place) {

@@ -2,7 +2,7 @@
 
 use super::{BRIGHTEST, Emitted, Enclosure, LightSample, Passed};
 use crate::math::{Frame, Ray, Rgb, Vec3, cast};
-use crate::sampling::{Discrete, warp};
+use crate::sampling::{Choice, Discrete, warp};
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 use std::sync::Arc;
 
@@ -258,8 +258,8 @@ impl Map {
     }
 
     fn sample(&self, u: [f32; 2]) -> Option<Vec3> {
-        let (y, _, v) = self.rows.as_ref()?.sample(u[0]);
-        let (x, _, t) = self.columns[y].as_ref()?.sample(u[1]);
+        let Choice { index: y, leftover: v, .. } = self.rows.as_ref()?.sample(u[0]);
+        let Choice { index: x, leftover: t, .. } = self.columns[y].as_ref()?.sample(u[1]);
         // Uniform over the texel's solid angle: even in longitude and in the cosine of the polar angle.
         let [top, bottom] = self.band(y);
         let cos = top + (bottom - top) * v;

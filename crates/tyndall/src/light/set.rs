@@ -3,7 +3,7 @@
 use super::{Emission, Environment, Light, LightSample, Target};
 use crate::math::{Ray, Rgb, Vec3};
 use crate::medium::Medium;
-use crate::sampling::{BounceSample, Discrete, Stream};
+use crate::sampling::{BounceSample, Choice, Discrete, Stream};
 
 /// The lights of a scene, glowing matter among them.
 #[derive(Clone, Debug)]
@@ -75,7 +75,7 @@ impl LightSet {
         numbers: &BounceSample,
         stream: &mut Stream,
     ) -> Option<LightSample> {
-        let (i, chance, _) = self.choice.as_ref()?.sample(numbers.light_choice);
+        let Choice { index: i, probability: chance, .. } = self.choice.as_ref()?.sample(numbers.light_choice);
         let sample = match self.lights.get(i) {
             Some(light) => light.sample(from, numbers.light),
             None => self.emission.as_ref()?.sample(medium, from, stream),

@@ -7,6 +7,17 @@ pub struct Discrete {
     cumulative: Vec<f64>,
 }
 
+/// One of several, chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Choice {
+    /// Which.
+    pub index: usize,
+    /// How likely it was.
+    pub probability: f32,
+    /// A fresh uniform number in [0, 1), left over from the choice.
+    pub leftover: f32,
+}
+
 impl Discrete {
     /// From weights that are finite and not negative; `None` if there is no positive one.
     #[must_use]
@@ -28,16 +39,20 @@ impl Discrete {
         self.cumulative[self.cumulative.len() - 1]
     }
 
-    /// The chosen index, its probability, and a fresh uniform number left over from the choice.
+    /// Chooses by a uniform number in [0, 1).
     #[inline]
     #[must_use]
-    pub fn sample(&self, u: f32) -> (usize, f32, f32) {
+    pub fn sample(&self, u: f32) -> Choice {
         let wanted = f64::from(u) * self.total();
         let last = self.cumulative.partition_point(|&c| c < self.total());
         let index = self.cumulative.partition_point(|&c| c <= wanted).min(last);
         let (below, weight) = self.slice(index);
         let left = ((wanted - below) / weight).clamp(0.0, 1.0 - f64::EPSILON);
-        (index, self.share(weight), crate::math::cast::single(left).min(1.0_f32.next_down()))
+        Choice {
+            index,
+            probability: self.share(weight),
+            leftover: crate::math::cast::single(left).min(1.0_f32.next_down()),
+        }
     }
 
     /// Probability of an index.
@@ -68,13 +83,13 @@ mod tests {
         let d = Discrete::new([0.0, 1.0, 0.0, 3.0, 4.0, 0.0]).unwrap();
         let mut counts = [0; 6];
         for i in 0..8000 {
-            let (k, p, left) = d.sample((i as f32 + 0.5) / 8000.0);
+            let Choice { index: k, probability: p, leftover: left } = d.sample((i as f32 + 0.5) / 8000.0);
             assert!((0.0..1.0).contains(&left));
             assert_eq!(p, d.probability(k));
             counts[k] += 1;
         }
         assert_eq!(counts, [0, 1000, 0, 3000, 4000, 0]);
-        assert_eq!(d.sample(1.0_f32.next_down()).0, 4);
+        assert_eq!(d.sample(1.0_f32.next_down()).index, 4);
         assert!(Discrete::new([0.0, 0.0]).is_none() && Discrete::new([]).is_none());
     }
 }

@@ -10,7 +10,7 @@ mod sampler;
 mod stream;
 pub mod warp;
 
-pub use discrete::Discrete;
+pub use discrete::{Choice, Discrete};
 pub use light_path::LightPathSampler;
 pub use philox::philox;
 pub use sampler::{BounceSample, PathSampler};

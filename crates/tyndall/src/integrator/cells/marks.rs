@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 /// Positions at which things changed, marked by many threads at once.
 #[derive(Debug)]
 pub(crate) struct ChangeMarks {
-    kind: Kind,
+    kind: MarkKind,
     any: AtomicBool,
     /// Positions marked, and how many make it not worth asking for one.
     marks: AtomicUsize,
@@ -20,7 +20,7 @@ pub(crate) struct ChangeMarks {
 }
 
 #[derive(Debug)]
-enum Kind {
+enum MarkKind {
     /// Nobody asks.
     Off,
     /// A bit for each cell of the grid from which a changed thing is within reach.
@@ -31,36 +31,36 @@ enum Kind {
 }
 
 impl ChangeMarks {
-    fn of(kind: Kind, enough: usize) -> Self {
+    fn of(kind: MarkKind, enough: usize) -> Self {
         Self { kind, any: AtomicBool::new(false), marks: AtomicUsize::new(0), enough }
     }
 
     /// Marks nothing.
     pub fn off() -> Self {
-        Self::of(Kind::Off, usize::MAX)
+        Self::of(MarkKind::Off, usize::MAX)
     }
 
     /// Marks cells.
     pub fn cells(grid: CellGrid, coarse: Arc<Cells>, enough: usize) -> Self {
         let bits = |count: usize| (0..count.div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
         let (near, near_coarse) = (bits(grid.len()), bits(coarse.ranges().len()));
-        Self::of(Kind::Cells { grid, near, coarse, near_coarse }, enough)
+        Self::of(MarkKind::Cells { grid, near, coarse, near_coarse }, enough)
     }
 
     /// Marks positions along each axis.
     pub fn axes(grid: CellGrid, enough: usize) -> Self {
-        Self::of(Kind::Axes { grid, axes: Default::default() }, enough)
+        Self::of(MarkKind::Axes { grid, axes: Default::default() }, enough)
     }
 
     /// Forgets all marks.
     pub fn clear(&mut self) {
         if std::mem::take(self.any.get_mut()) {
             match &mut self.kind {
-                Kind::Off => {}
-                Kind::Cells { near, near_coarse, .. } => {
+                MarkKind::Off => {}
+                MarkKind::Cells { near, near_coarse, .. } => {
                     near.iter_mut().chain(near_coarse).for_each(|word| *word.get_mut() = 0);
                 }
-                Kind::Axes { axes, .. } => axes.iter_mut().for_each(|word| *word.get_mut() = 0),
+                MarkKind::Axes { axes, .. } => axes.iter_mut().for_each(|word| *word.get_mut() = 0),
             }
         }
         *self.marks.get_mut() = 0;
@@ -87,7 +87,7 @@ impl ChangeMarks {
 
     /// Marks where things are.
     pub fn mark_all(&self, things: &[impl Positioned]) {
-        if matches!(self.kind, Kind::Off) || things.is_empty() {
+        if matches!(self.kind, MarkKind::Off) || things.is_empty() {
             return;
         }
         self.any.store(true, Ordering::Relaxed);
@@ -99,12 +99,12 @@ impl ChangeMarks {
     /// Marks a position in index space.
     fn mark(&self, position: Vec3) {
         match &self.kind {
-            Kind::Off => {}
-            Kind::Cells { grid, near, coarse, near_coarse } => {
+            MarkKind::Off => {}
+            MarkKind::Cells { grid, near, coarse, near_coarse } => {
                 grid.neighbours(grid.cell(grid.to_metric(position))).for_each(|i| set(near, i));
                 coarse.cells_within(position, grid.index_reach()).for_each(|i| set(near_coarse, i));
             }
-            Kind::Axes { grid, axes } => {
+            MarkKind::Axes { grid, axes } => {
                 let bins = grid.axis_bins(grid.to_metric(position));
                 for (axis, bin) in axes.iter().zip(bins) {
                     axis.fetch_or(1 << bin, Ordering::Relaxed);
@@ -117,9 +117,9 @@ impl ChangeMarks {
     #[inline]
     pub fn near_cell(&self, cell: usize) -> bool {
         match &self.kind {
-            Kind::Off => false,
-            Kind::Cells { near_coarse, .. } => is_set(near_coarse, cell),
-            Kind::Axes { .. } => true,
+            MarkKind::Off => false,
+            MarkKind::Cells { near_coarse, .. } => is_set(near_coarse, cell),
+            MarkKind::Axes { .. } => true,
         }
     }
 
@@ -127,9 +127,11 @@ impl ChangeMarks {
     #[inline]
     pub fn near(&self, position: Vec3) -> bool {
         match &self.kind {
-            Kind::Off => false,
-            Kind::Cells { grid, near, .. } => is_set(near, grid.number(grid.cell(grid.to_metric(position)))),
-            Kind::Axes { grid, axes } => {
+            MarkKind::Off => false,
+            MarkKind::Cells { grid, near, .. } => {
+                is_set(near, grid.number(grid.cell(grid.to_metric(position))))
+            }
+            MarkKind::Axes { grid, axes } => {
                 let masks = grid.axis_reach(grid.to_metric(position));
                 axes.iter().zip(masks).all(|(axis, mask)| axis.load(Ordering::Relaxed) & mask != 0)
             }

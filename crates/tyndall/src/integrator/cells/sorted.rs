@@ -3,6 +3,7 @@
 use super::{CellGrid, Positioned};
 use crate::math::cast;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Where each cell's items begin among those sorted by cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -11,10 +12,10 @@ pub(crate) struct CellStarts(Vec<u32>);
 impl CellStarts {
     /// The range of items in the cells of a row along x, from the first to the last, which lie side by side.
     #[inline(always)]
-    pub fn row(&self, grid: &CellGrid, [x0, x1]: [usize; 2], y: usize, z: usize) -> [usize; 2] {
+    pub fn row(&self, grid: &CellGrid, [x0, x1]: [usize; 2], y: usize, z: usize) -> Range<usize> {
         let first = self.0[grid.number([x0, y, z])];
         let end = self.0[grid.number([x1, y, z]) + 1];
-        [first as usize, end as usize]
+        first as usize..end as usize
     }
 
     /// Bytes kept.

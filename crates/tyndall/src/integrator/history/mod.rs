@@ -1,10 +1,10 @@
-//! Histories: which data values a computation has read, and what an edit asks of them \[Jonsson12, sec. 4.2\].
+//! PackedHistories: which data values a computation has read, and what an edit asks of them \[Jonsson12, sec. 4.2\].
 
 mod bounds;
 mod packed;
 mod touched;
 
-pub(crate) use packed::Histories;
+pub(crate) use packed::PackedHistories;
 pub(crate) use touched::Touched;
 
 use crate::medium::{FlightNotes, Medium};

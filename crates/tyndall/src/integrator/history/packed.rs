@@ -5,13 +5,13 @@ use crate::transfer::Historygram;
 
 /// Historygrams side by side, in 4, 8 or 16 bytes each.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Histories {
+pub(crate) struct PackedHistories {
     /// Words of 32 bits each, the lowest first.
     words: Vec<u32>,
     width: usize,
 }
 
-impl Histories {
+impl PackedHistories {
     /// Empty; for Historygrams of so many groups.
     pub fn new(groups: u8) -> Self {
         Self { words: Vec::new(), width: usize::from(groups).div_ceil(32) }
@@ -74,10 +74,10 @@ mod tests {
     fn what_is_put_in_comes_out() {
         for groups in [32, 64, 128] {
             let some = |i: u32| Historygram::from_bits(1 << (i % u32::from(groups)) | 1 << (i * 7 % 32));
-            let mut histories = Histories::new(groups);
+            let mut histories = PackedHistories::new(groups);
             (0..200).for_each(|i| histories.push(some(i)));
             assert_eq!(histories.bytes(), 200 * usize::from(groups) / 8);
-            let mut others = Histories::with_len(groups, 3);
+            let mut others = PackedHistories::with_len(groups, 3);
             others.extend(&histories, 50..150);
             others.set(1, some(5));
             assert!((0..200).all(|i| histories.get(i as usize) == some(i)));

@@ -5,7 +5,7 @@ use super::tracer::{LightPath, Resumed, Tracer, Vertex, Vertices, bounce_of};
 use super::{HistoryDetail, PathNumbers};
 use crate::integrator::Stop;
 use crate::integrator::cells::ChangeMarks;
-use crate::integrator::history::{Histories, Past};
+use crate::integrator::history::{PackedHistories, Past};
 use crate::math::cast;
 use crate::simd::{Kernel, Lanes};
 use std::ops::Range;
@@ -26,14 +26,22 @@ pub(crate) struct Chunk<V> {
     underway: Option<Box<Underway<V>>>,
 }
 
+/// Bytes of a chunk, histories included.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct ChunkBytes {
+    /// Of what belongs to whole paths.
+    pub paths: usize,
+    pub vertices: usize,
+}
+
 /// Paths that have been traced, from the first on.
 #[derive(Clone, Debug)]
 struct Traced<V> {
     /// Where each path's interactions end.
     ends: Vec<u32>,
     /// What each path as a whole depends on.
-    flight: Histories,
-    scatter: Histories,
+    flight: PackedHistories,
+    scatter: PackedHistories,
     vertices: Vertices<V>,
 }
 
@@ -46,7 +54,7 @@ struct Underway<V> {
 
 impl<V: Vertex> Traced<V> {
     fn new(groups: u8, each_has_a_past: bool) -> Self {
-        let (flight, scatter) = (Histories::new(groups), Histories::new(groups));
+        let (flight, scatter) = (PackedHistories::new(groups), PackedHistories::new(groups));
         Self { ends: Vec::new(), flight, scatter, vertices: Vertices::new(groups, each_has_a_past) }
     }
 
@@ -119,10 +127,11 @@ impl<V: Vertex> Chunk<V> {
     }
 
     /// Bytes kept for the paths themselves, and for their interactions.
-    pub fn bytes(&self) -> [usize; 2] {
+    pub fn bytes(&self) -> ChunkBytes {
         let Traced { ends, flight, scatter, vertices } = &self.traced;
         let histories = flight.bytes() + scatter.bytes();
-        [size_of_val(&self.paths[..]) + size_of_val(&ends[..]) + histories, vertices.bytes()]
+        let paths = size_of_val(&self.paths[..]) + size_of_val(&ends[..]) + histories;
+        ChunkBytes { paths, vertices: vertices.bytes() }
     }
 
     /// Paths that are other ones in another chunk of the same paths, or were not traced there.

@@ -4,7 +4,7 @@
 mod chunk;
 mod tracer;
 
-pub(crate) use chunk::Chunk;
+pub(crate) use chunk::{Chunk, ChunkBytes};
 pub(crate) use tracer::{Arrival, Vertex, most_kept};
 
 use crate::integrator::Limits;
@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use tracer::{Source, Tracer};
+use tracer::{Emitter, Tracer};
 
 /// The paths of one light.
 #[derive(Clone, Debug)]
@@ -88,9 +88,18 @@ impl PathNumbers {
 /// The stream of glowing matter's random numbers.
 const MATTER: u32 = u32::MAX;
 
+/// What paths start from.
+#[derive(Clone, Debug)]
+pub(crate) struct PathSource {
+    /// `None` for glowing matter.
+    pub light: Option<Light>,
+    /// Tells its random numbers from those of other sources.
+    pub stream: u32,
+}
+
 /// A scene's lights and its glowing matter, with the streams of their random numbers: by name where a light has one, so that
-/// it keeps them when others come and go; else by its number. In the order of the streams, in which photons are added up too.
-pub(crate) fn sources(scene: &Scene) -> Vec<(Option<Light>, u32)> {
+/// it keeps them when others come and go; else by its number. In the order of the streams, in which light is added up too.
+pub(crate) fn sources(scene: &Scene) -> Vec<PathSource> {
     let lights = scene.lights.lights();
     let mut first_of: HashMap<&str, usize> = HashMap::new();
     for (i, name) in scene.light_names.iter().enumerate() {
@@ -106,16 +115,16 @@ pub(crate) fn sources(scene: &Scene) -> Vec<(Option<Light>, u32)> {
         }
         _ => cast::fit_u32(i),
     };
-    let matter = scene.lights.emission().map(|_| (None, MATTER));
-    let mut sources: Vec<_> =
-        (0..lights.len()).map(|i| (Some(lights[i].clone()), stream(i))).chain(matter).collect();
-    sources.sort_by_key(|source| source.1);
+    let of_light = |(i, light): (usize, &Light)| PathSource { light: Some(light.clone()), stream: stream(i) };
+    let matter = scene.lights.emission().map(|_| PathSource { light: None, stream: MATTER });
+    let mut sources: Vec<_> = lights.iter().enumerate().map(of_light).chain(matter).collect();
+    sources.sort_by_key(|source| source.stream);
     sources
 }
 
 impl<V: Vertex> LightPaths<V> {
     /// Paths yet to be traced. In each block of paths that are stratified together, those that start alike come together.
-    pub fn new((light, stream): (Option<Light>, u32), plan: &Plan) -> Self {
+    pub fn new(PathSource { light, stream }: PathSource, plan: &Plan) -> Self {
         let Plan { count, seed, pass, groups, histories } = *plan;
         const BLOCK: u32 = LightPathSampler::STRATIFIED;
         let numbers = PathNumbers { seed, pass, stream };
@@ -135,7 +144,7 @@ impl<V: Vertex> LightPaths<V> {
 
     /// Changes how many paths there are; whole blocks that are in both stay as they are.
     pub fn set_count(&mut self, plan: &Plan) {
-        let other = Self::new((self.light.take(), self.stream), plan);
+        let other = Self::new(PathSource { light: self.light.take(), stream: self.stream }, plan);
         let whole = (self.count.min(plan.count) / LightPathSampler::STRATIFIED) as usize;
         let chunks = whole * (LightPathSampler::STRATIFIED as usize).div_ceil(chunk::PATHS);
         let old = std::mem::replace(self, other);
@@ -147,8 +156,8 @@ impl<V: Vertex> LightPaths<V> {
         self.light.as_ref().map_or(Rgb::WHITE, Light::color)
     }
 
-    fn source<'a>(light: Option<&'a Light>, scene: &'a Scene) -> Option<Source<'a>> {
-        light.map(Source::Light).or_else(|| scene.lights.emission().map(Source::Matter))
+    fn source<'a>(light: Option<&'a Light>, scene: &'a Scene) -> Option<Emitter<'a>> {
+        light.map(Emitter::Light).or_else(|| scene.lights.emission().map(Emitter::Matter))
     }
 }
 
@@ -178,7 +187,7 @@ impl Tracing<'_> {
     pub fn trace<V: Vertex>(&self, lights: &mut [LightPaths<V>]) -> TracingProgress {
         let Self { scene, ground: Ground { reading, enclosure, level }, pass, marks, limits } = *self;
         let seed = scene.render.seed;
-        let mut work: Vec<(&mut Chunk<V>, Source, PathNumbers)> = Vec::new();
+        let mut work: Vec<(&mut Chunk<V>, Emitter, PathNumbers)> = Vec::new();
         for LightPaths { light, stream, chunks, .. } in lights {
             if let Some(source) = LightPaths::<V>::source(light.as_ref(), scene) {
                 let numbers = PathNumbers { seed, pass, stream: *stream };

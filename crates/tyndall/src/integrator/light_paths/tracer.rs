@@ -2,7 +2,7 @@
 
 use crate::integrator::Stop;
 use crate::integrator::cells::Positioned;
-use crate::integrator::history::{Histories, Past, Reading};
+use crate::integrator::history::{PackedHistories, Past, Reading};
 use crate::light::{Emission, Enclosure, Light};
 use crate::math::{Ray, Rgb, Vec3};
 use crate::medium::Medium;
@@ -65,7 +65,7 @@ pub(crate) fn most_kept(max_scatter: u32) -> f64 {
 
 /// What light paths start from.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Source<'a> {
+pub(crate) enum Emitter<'a> {
     Light(&'a Light),
     Matter(&'a Emission),
 }
@@ -75,13 +75,13 @@ pub(crate) enum Source<'a> {
 pub(super) struct Vertices<V> {
     pub stored: Vec<V>,
     /// Of each, for flight and scattering; `None` where paths have one alone.
-    pasts: Option<[Histories; 2]>,
+    pasts: Option<[PackedHistories; 2]>,
 }
 
 impl<V: Vertex> Vertices<V> {
     /// None yet.
     pub fn new(groups: u8, each_has_a_past: bool) -> Self {
-        let pasts = each_has_a_past.then(|| [Histories::new(groups), Histories::new(groups)]);
+        let pasts = each_has_a_past.then(|| [PackedHistories::new(groups), PackedHistories::new(groups)]);
         Self { stored: Vec::new(), pasts }
     }
 
@@ -118,11 +118,11 @@ impl<V: Vertex> Vertices<V> {
     /// Releases memory that is not needed.
     pub fn shrink_to_fit(&mut self) {
         self.stored.shrink_to_fit();
-        self.pasts.iter_mut().flatten().for_each(Histories::shrink_to_fit);
+        self.pasts.iter_mut().flatten().for_each(PackedHistories::shrink_to_fit);
     }
 
     pub fn bytes(&self) -> usize {
-        let pasts = self.pasts.iter().flatten().map(Histories::bytes).sum::<usize>();
+        let pasts = self.pasts.iter().flatten().map(PackedHistories::bytes).sum::<usize>();
         size_of_val(&self.stored[..]) + pasts
     }
 }
@@ -131,7 +131,7 @@ impl<V: Vertex> Vertices<V> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tracer<'a> {
     pub scene: &'a Scene,
-    pub source: Source<'a>,
+    pub source: Emitter<'a>,
     pub enclosure: &'a Enclosure,
     pub reading: &'a Reading,
 }
@@ -212,8 +212,8 @@ impl Tracer<'_> {
     fn emit(&self, numbers: &LightPathSampler) -> Option<Flight> {
         let u = numbers.emission();
         let emitted = match self.source {
-            Source::Light(light) => light.emit(self.enclosure, u),
-            Source::Matter(glow) => glow.emit(self.medium(), u, &mut numbers.stream(u32::MAX)),
+            Emitter::Light(light) => light.emit(self.enclosure, u),
+            Emitter::Matter(glow) => glow.emit(self.medium(), u, &mut numbers.stream(u32::MAX)),
         }?;
         Some(Flight { ray: emitted.ray, flux: emitted.flux, bounce: 0 })
     }

@@ -23,7 +23,7 @@ use crate::simd::Level;
 use rayon::prelude::*;
 use samples::{SampleCounts, SampleKeeper, SampleTile};
 use std::any::Any;
-use tracer::{CameraPath, Refine, Trace};
+use tracer::{CameraPath, TraceOne, TracePixels};
 
 /// The path tracer. If it may keep samples, an edit takes again those alone that it touched.
 #[derive(Debug)]
@@ -50,7 +50,7 @@ impl PathTracer {
     /// An unbiased estimate of the radiance that arrives along a world ray.
     #[must_use]
     pub fn trace(&self, scene: &Scene, ray: Ray, numbers: PathSampler) -> PixelSample {
-        self.level.run(Trace { scene, path: CameraPath::new(ray, numbers) })
+        self.level.run(TraceOne { scene, path: CameraPath::new(ray, numbers) })
     }
 }
 
@@ -89,7 +89,15 @@ impl Method for PathTracer {
 
     fn refine(&self, scene: &Scene, tile: &mut Tile, state: &mut TileState, samples: u32, stop: &Stop) {
         let TileState { pending, samples: kept } = state;
-        self.level.run(Refine { scene, tile, pending, kept, keeper: self.keeper.as_ref(), samples, stop });
+        self.level.run(TracePixels {
+            scene,
+            tile,
+            pending,
+            kept,
+            keeper: self.keeper.as_ref(),
+            samples,
+            stop,
+        });
     }
 
     fn report(&self, tiles: &[TileState], pixels: &PixelCounts) -> MethodReport {

@@ -2,7 +2,7 @@
 //! are taken again.
 
 use crate::film::{PixelSample, Tile};
-use crate::integrator::history::{Histories, Past, Reading, Touched};
+use crate::integrator::history::{PackedHistories, Past, Reading, Touched};
 use crate::integrator::{Edited, ItemChanges};
 use crate::math::Rgb;
 use crate::scene::{Background, Difference, Scene};
@@ -13,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 const GROUPS: u8 = 64;
 
 /// Bytes of a sample with its histories.
-const BYTES: usize = size_of::<Sample>() + 2 * GROUPS as usize / 8;
+const BYTES: usize = size_of::<KeptSample>() + 2 * GROUPS as usize / 8;
 
 /// What a session's samples are kept by.
 #[derive(Debug)]
@@ -77,7 +77,7 @@ pub(super) struct SampleQuery {
 /// What a sample found.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-struct Sample {
+struct KeptSample {
     /// The first is no number where the sample is to be taken again.
     radiance: [f32; 3],
     /// No number where no matter was met.
@@ -87,9 +87,9 @@ struct Sample {
 /// The samples of a tile's pixels, in the order in which they are taken.
 #[derive(Clone, Debug)]
 pub struct SampleTile {
-    samples: Vec<Sample>,
-    flight: Histories,
-    scatter: Histories,
+    samples: Vec<KeptSample>,
+    flight: PackedHistories,
+    scatter: PackedHistories,
     pub(super) counts: SampleCounts,
 }
 
@@ -104,7 +104,7 @@ pub(super) struct SampleCounts {
 
 impl Default for SampleTile {
     fn default() -> Self {
-        let histories = Histories::new(GROUPS);
+        let histories = PackedHistories::new(GROUPS);
         Self {
             samples: Vec::new(),
             flight: histories.clone(),
@@ -128,7 +128,7 @@ impl SampleTile {
     /// The `i`-th sample, unless it is to be taken.
     #[inline]
     pub fn get(&mut self, i: usize) -> Option<PixelSample> {
-        let Sample { radiance, depth } = *self.samples.get(i)?;
+        let KeptSample { radiance, depth } = *self.samples.get(i)?;
         if radiance[0].is_nan() {
             return None;
         }
@@ -145,7 +145,7 @@ impl SampleTile {
     #[inline]
     pub(super) fn put(&mut self, i: usize, sample: &PixelSample, past: &Past, pixels: usize) {
         let depth = if sample.alpha > 0.0 { sample.depth } else { f32::NAN };
-        let sample = Sample { radiance: sample.radiance.to_array(), depth };
+        let sample = KeptSample { radiance: sample.radiance.to_array(), depth };
         if i == self.samples.len() {
             if self.samples.len() == self.samples.capacity() {
                 self.reserve(pixels.max(self.samples.len() / 4));

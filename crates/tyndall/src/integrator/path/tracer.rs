@@ -17,7 +17,7 @@ use std::ops::ControlFlow;
 const ROULETTE_WEIGHT: f32 = 1.0;
 
 /// Adds one path to every pixel of a tile until each has so many samples, unless a stop comes first.
-pub(super) struct Refine<'a> {
+pub(super) struct TracePixels<'a> {
     pub scene: &'a Scene,
     pub tile: &'a mut Tile,
     /// A path that a stop left half done.
@@ -29,7 +29,7 @@ pub(super) struct Refine<'a> {
     pub stop: &'a Stop<'a>,
 }
 
-impl Kernel for Refine<'_> {
+impl Kernel for TracePixels<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -86,12 +86,12 @@ impl PathNotes for Writer<'_> {
 }
 
 /// Traces one path to its end.
-pub(super) struct Trace<'a> {
+pub(super) struct TraceOne<'a> {
     pub scene: &'a Scene,
     pub path: CameraPath,
 }
 
-impl Kernel for Trace<'_> {
+impl Kernel for TraceOne<'_> {
     type Output = PixelSample;
 
     #[inline(always)]

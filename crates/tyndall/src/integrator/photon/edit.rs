@@ -4,7 +4,7 @@ use super::stored::Photon;
 use super::{PhotonMapper, SegmentTile, marks_for, plan, step};
 use crate::integrator::Edited;
 use crate::integrator::history::Touched;
-use crate::integrator::light_paths::{LightPaths, sources};
+use crate::integrator::light_paths::{LightPaths, PathSource, sources};
 use crate::light::Light;
 use crate::scene::Scene;
 
@@ -54,7 +54,7 @@ impl PhotonMapper {
         let sources = sources(scene);
         let plan = plan(scene, &self.settings, sources.len());
         let mut old: Vec<Option<LightPaths<Photon>>> = self.lights.drain(..).map(Some).collect();
-        for (light, stream) in sources {
+        for PathSource { light, stream } in sources {
             let kept = old.iter_mut().find(|old| old.as_ref().is_some_and(|old| old.stream == stream));
             let same = |old: &LightPaths<Photon>| match (&old.light, &light) {
                 (Some(old), Some(light)) => old.same_paths(light),
@@ -78,7 +78,7 @@ impl PhotonMapper {
                 }
                 None => {
                     self.map = None;
-                    LightPaths::new((light, stream), &plan)
+                    LightPaths::new(PathSource { light, stream }, &plan)
                 }
             };
             if paths.count != plan.count {

@@ -1,6 +1,6 @@
 //! What photons tell about the light at a place \[Jonsson12, eq. 8\].
 
-use super::kernel::{Ball, Kernel, Slice};
+use super::kernel::{Ball, GatherRegion, Slice};
 use super::map::PhotonMap;
 use super::matter::Matter;
 use super::settings::Estimator;
@@ -10,6 +10,7 @@ use crate::scattering::{Brdf, Event, Phase};
 use crate::simd::{Lanes, unpack_directions};
 use fearless_simd::prelude::*;
 use std::f32::consts::{FRAC_1_PI, PI};
+use std::ops::Range;
 
 /// Where light is gathered, and for whom.
 #[derive(Clone, Copy, Debug)]
@@ -55,12 +56,12 @@ impl PhotonMap {
 
     /// The estimate over a part of space.
     #[inline(always)]
-    fn within<S: Lanes, K: Kernel>(
+    fn within<S: Lanes, R: GatherRegion>(
         &self,
         simd: S,
         medium: &Medium,
         at: &Gathering,
-        mut kernel: K,
+        mut kernel: R,
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
         let (q, here) = (self.grid.to_metric(at.place), (at.place, at.opacity, at.lane));
@@ -83,7 +84,7 @@ impl PhotonMap {
         let [x, [y0, y1], [z0, z1]] = self.grid.around(q, kernel.reach());
         for z in z0..=z1 {
             for y in y0..=y1 {
-                let [mut i, end] = self.row(x, y, z);
+                let Range { start: mut i, end } = self.row(x, y, z);
                 while i < end {
                     let [dx, dy, dz] = self.apart(simd, q, i);
                     let there = number.simd_lt(S::f32s::splat(simd, (end - i) as f32));
@@ -117,7 +118,7 @@ impl PhotonMap {
         let [x, [y0, y1], [z0, z1]] = self.grid.around(q, Vec3::ONE);
         for z in z0..=z1 {
             for y in y0..=y1 {
-                let [mut i, end] = self.row(x, y, z);
+                let Range { start: mut i, end } = self.row(x, y, z);
                 while i < end {
                     let [dx, dy, dz] = self.apart(simd, q, i);
                     let squared = dx * dx + dy * dy + dz * dz;

@@ -7,7 +7,7 @@ use fearless_simd::prelude::*;
 use std::f32::consts::PI;
 
 /// A part of metric space about a place.
-pub(super) trait Kernel: Copy {
+pub(super) trait GatherRegion: Copy {
     /// How far it reaches where it is not flattened: all round, or about a ray.
     fn radius(&self) -> f32;
 
@@ -49,7 +49,7 @@ impl<'a> Ball<'a> {
     }
 }
 
-impl Kernel for Ball<'_> {
+impl GatherRegion for Ball<'_> {
     fn radius(&self) -> f32 {
         self.radius
     }
@@ -110,7 +110,7 @@ impl<'a> Slice<'a> {
     }
 }
 
-impl Kernel for Slice<'_> {
+impl GatherRegion for Slice<'_> {
     fn radius(&self) -> f32 {
         1.0
     }

@@ -8,6 +8,7 @@ use crate::integrator::light_paths::Chunk;
 use crate::math::{DVec3, Vec3, cast};
 use crate::medium::Medium;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Interactions in the order of their cells, then of lights, paths and bounces, so that sums do not depend on what was
 /// traced when. Arrays end with room for a whole vector.
@@ -90,7 +91,7 @@ impl PhotonMap {
 
     /// The range of photons in the cells of a row, which lie side by side.
     #[inline(always)]
-    pub fn row(&self, xs: [usize; 2], y: usize, z: usize) -> [usize; 2] {
+    pub fn row(&self, xs: [usize; 2], y: usize, z: usize) -> Range<usize> {
         self.starts.row(&self.grid, xs, y, z)
     }
 }

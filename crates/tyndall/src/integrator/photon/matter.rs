@@ -9,7 +9,7 @@
 //! Matter denser than the place counts as dense as the place, and its photons for so much less: else what the points miss of a
 //! dense neighbour, and the flux there, would light up all the thin matter about it.
 
-use super::kernel::Kernel;
+use super::kernel::GatherRegion;
 use crate::math::{Mat3, Vec3};
 use crate::medium::{MOST_LANES, MarchNotes, Medium};
 use crate::simd::Lanes;
@@ -44,7 +44,7 @@ impl Matter {
         medium: &Medium,
         (place, own, lane): (Vec3, f32, usize),
         to_index: &Mat3,
-        kernel: &impl Kernel,
+        kernel: &impl GatherRegion,
         notes: &mut impl MarchNotes<S>,
     ) -> Self {
         let zero = S::f32s::splat(simd, 0.0);

@@ -24,10 +24,10 @@ pub use settings::{Estimate, Histories, HistoryBins, Settings, SpatialHistory};
 
 use super::cells::{CellGrid, ChangeMarks};
 use super::history::Reading;
-use super::light_paths::{Chunk, Ground, HistoryDetail, LightPaths, Plan, Tracing, most_kept, sources};
+use super::light_paths::{ChunkBytes, Ground, HistoryDetail, LightPaths, Plan, Tracing, most_kept, sources};
 use super::{
     Edited, ItemChanges, KeptCount, KeptItems, Limits, MemoryNeed, Method, MethodReport, NamedCount,
-    PixelCounts, Resources, SettingProblem, Stages, Stop, WorkShare,
+    PixelCounts, Resources, SettingProblem, StageNames, Stop, WorkShare,
 };
 use crate::film::Tile;
 use crate::light::Enclosure;
@@ -36,7 +36,7 @@ use crate::scene::{Difference, Scene};
 use kernel::Slice;
 use map::{Lit, PhotonMap};
 use pass::Pass;
-use segments::{Refine, SegmentCounts, SegmentTile};
+use segments::{GatherSegments, SegmentCounts, SegmentTile};
 use settings::Estimator;
 use std::any::Any;
 use stored::Photon;
@@ -85,12 +85,12 @@ impl PhotonMapper {
     /// What is kept for edits to come beside segments.
     fn kept_paths(&self) -> [KeptCount; 3] {
         let chunks = || self.lights.iter().flat_map(|light| &light.chunks);
-        let [paths, photons] = chunks().map(Chunk::bytes).fold([0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        let bytes = |of: fn(ChunkBytes) -> usize| chunks().map(|chunk| of(chunk.bytes())).sum();
         let count = self.photons();
         let map = self.map.as_ref().map_or(0, PhotonMap::bytes);
         [
-            KeptCount { name: "paths", count: self.paths(), bytes: paths },
-            KeptCount { name: "photons", count, bytes: photons },
+            KeptCount { name: "paths", count: self.paths(), bytes: bytes(|chunk| chunk.paths) },
+            KeptCount { name: "photons", count, bytes: bytes(|chunk| chunk.vertices) },
             KeptCount { name: "map", count, bytes: map },
         ]
     }
@@ -232,7 +232,7 @@ impl Method for PhotonMapper {
         if tile.samples() > 0 {
             let map = self.pass.as_ref().and_then(|pass| pass.map.as_ref());
             let view = View { scene, map, step, gather_spacing };
-            self.ground.level.run(pass::Refine { view, tile, stop });
+            self.ground.level.run(pass::GatherPass { view, tile, stop });
             return;
         }
         let Ground { reading: Reading { groups, cells, .. }, level, .. } = &self.ground;
@@ -242,7 +242,7 @@ impl Method for PhotonMapper {
             SegmentTile::new(pixels, per_ray, groups.count())
         });
         let view = View { scene, map: self.map.as_ref(), step, gather_spacing };
-        level.run(Refine { view, segments, tile, groups, cells, places: &self.marks, stop });
+        level.run(GatherSegments { view, segments, tile, groups, cells, places: &self.marks, stop });
     }
 
     fn report(&self, tiles: &[Option<SegmentTile>], _: &PixelCounts) -> MethodReport {
@@ -259,7 +259,7 @@ impl Method for PhotonMapper {
             kept: self.kept_paths().into_iter().chain([segments_kept]).collect(),
             items_computed: Some(traced + computed),
             counts: vec![NamedCount { name: "gathers", count: sum(|tile| tile.computed.gathers) }],
-            stages: Stages { preparation: Some("photons"), sampling: "segments" },
+            stages: StageNames { preparation: Some("photons"), sampling: "segments" },
         }
     }
 

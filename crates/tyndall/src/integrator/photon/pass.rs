@@ -60,13 +60,13 @@ impl Pass {
 }
 
 /// Takes a sample of every pixel of a tile, along jittered rays with jittered steps, unless a stop comes first.
-pub(super) struct Refine<'a> {
+pub(super) struct GatherPass<'a> {
     pub view: View<'a>,
     pub tile: &'a mut Tile,
     pub stop: &'a Stop<'a>,
 }
 
-impl Kernel for Refine<'_> {
+impl Kernel for GatherPass<'_> {
     type Output = ();
 
     #[inline(always)]

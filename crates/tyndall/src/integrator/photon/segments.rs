@@ -3,7 +3,7 @@
 use super::view::{Notes, Stretch, Stretches, View};
 use crate::film::{PixelSample, Tile};
 use crate::integrator::cells::ChangeMarks;
-use crate::integrator::history::Histories;
+use crate::integrator::history::PackedHistories;
 use crate::integrator::view_march::OPAQUE;
 use crate::integrator::{ItemChanges, Stop};
 use crate::math::{Ray, Rgb, cast};
@@ -20,7 +20,7 @@ pub struct SegmentTile {
     per_ray: usize,
     segments: Vec<Segment>,
     /// Values that each segment read.
-    histories: Histories,
+    histories: PackedHistories,
     /// Values that have changed since the segments were last asked, unless there was no edit.
     changed: Option<Historygram>,
     pub(super) computed: SegmentCounts,
@@ -90,7 +90,7 @@ impl SegmentTile {
         Self {
             per_ray,
             segments: vec![Segment::UNKNOWN; count],
-            histories: Histories::with_len(groups, count),
+            histories: PackedHistories::with_len(groups, count),
             changed: None,
             computed: SegmentCounts::default(),
         }
@@ -256,7 +256,7 @@ fn forget_near(view: &View, pixel: [u32; 2], places: &ChangeMarks, segments: &mu
 
 /// Computes the segments of a tile that show and are not known, and gives each pixel its sample, unless a
 /// stop comes first.
-pub(super) struct Refine<'a> {
+pub(super) struct GatherSegments<'a> {
     pub view: View<'a>,
     pub segments: &'a mut SegmentTile,
     pub tile: &'a mut Tile,
@@ -266,7 +266,7 @@ pub(super) struct Refine<'a> {
     pub stop: &'a Stop<'a>,
 }
 
-impl Kernel for Refine<'_> {
+impl Kernel for GatherSegments<'_> {
     type Output = ();
 
     #[inline(always)]

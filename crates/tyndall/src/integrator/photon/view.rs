@@ -101,12 +101,12 @@ impl View<'_> {
     fn scattered<S: Lanes>(
         &self,
         simd: S,
-        sample: &Sample,
+        sample: &ViewSample,
         distances: &mut Vec<f32>,
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
         let Some(map) = self.map else { return Rgb::BLACK };
-        let Sample { place, value, width, w_out, lane } = *sample;
+        let ViewSample { place, value, width, w_out, lane } = *sample;
         let medium = &*self.scene.medium;
         let optics = medium.transfer().optics(value);
         let event = medium.event(place, &optics);
@@ -155,7 +155,7 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
             if weight > 0.0 {
                 let [x, y, z] = sample.place;
                 let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
-                let here = Sample {
+                let here = ViewSample {
                     place,
                     value: sample.value.as_slice()[lane],
                     width: width.as_slice()[lane],
@@ -171,7 +171,7 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
 }
 
 /// A sample of one ray.
-struct Sample {
+struct ViewSample {
     /// Index space.
     place: Vec3,
     value: f32,

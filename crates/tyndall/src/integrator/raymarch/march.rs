@@ -39,13 +39,13 @@ impl RayMarch {
         samples: u32,
         stop: &Stop,
     ) {
-        self.level.run(Refine { raymarch: self, scene, tile, pending, samples, stop });
+        self.level.run(MarchPixels { raymarch: self, scene, tile, pending, samples, stop });
     }
 
     /// The radiance that arrives along a world ray.
     #[must_use]
     pub fn march(&self, scene: &Scene, ray: &Ray) -> PixelSample {
-        self.level.run(March { raymarch: self, scene, packet: Packet::new(scene, [*ray].into_iter()) })
+        self.level.run(MarchOne { raymarch: self, scene, packet: Packet::new(scene, [*ray].into_iter()) })
     }
 
     /// A pixel's `sample`-th ray. Samples serve the pixel filter and the lens alone; the first goes
@@ -211,7 +211,7 @@ impl Packet {
     }
 }
 
-struct Refine<'a> {
+struct MarchPixels<'a> {
     raymarch: &'a RayMarch,
     scene: &'a Scene,
     tile: &'a mut Tile,
@@ -220,7 +220,7 @@ struct Refine<'a> {
     stop: &'a Stop<'a>,
 }
 
-impl Kernel for Refine<'_> {
+impl Kernel for MarchPixels<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -245,13 +245,13 @@ impl Kernel for Refine<'_> {
     }
 }
 
-struct March<'a> {
+struct MarchOne<'a> {
     raymarch: &'a RayMarch,
     scene: &'a Scene,
     packet: Packet,
 }
 
-impl Kernel for March<'_> {
+impl Kernel for MarchOne<'_> {
     type Output = PixelSample;
 
     #[inline(always)]

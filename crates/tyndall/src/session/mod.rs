@@ -206,3 +206,6 @@ impl Session {
         if self.engine.has_noise() { self.film.relative_error() } else { None }
     }
 }
+
+#[cfg(test)]
+mod tests;
