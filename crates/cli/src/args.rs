@@ -204,6 +204,10 @@ pub struct BenchOptions {
     #[arg(long)]
     pub json: bool,
 
+    /// As Markdown tables, for the documentation
+    #[arg(long, conflicts_with = "json")]
+    pub markdown: bool,
+
     /// Smaller sizes, once each: shows that it works, measures nothing
     #[arg(long)]
     pub quick: bool,

@@ -3,6 +3,7 @@
 mod support;
 
 use support::{Ended, Folder, json, run};
+use tyndall_formats::image::{Metadata, read_metadata};
 
 /// A cloud in a few pixels.
 const SCENE: &str = "\
@@ -81,6 +82,33 @@ fn samples_that_are_no_numbers_are_counted_and_read_as_an_end_of_the_range() {
         assert!(text.contains("not finite 3 samples; NaN is read as the smallest value"), "{text}");
         assert!(text.contains("values     2 to 4;"), "{text}");
     }
+}
+
+/// Pictures of older versions carry a key at its old place.
+#[test]
+fn a_key_at_its_old_place_is_read_with_a_note() {
+    let folder = Folder::new();
+    folder.put("old.toml", format!("{SCENE}render.path.majorant_cell = 4\n"));
+    folder.put("both.toml", format!("{SCENE}render.path.majorant_cell = 4\nmedium.majorant_cell = 8\n"));
+    let Ended { status, stderr, .. } = folder.run(&["render", "../old.toml"]);
+    assert_eq!(status, Some(0), "{stderr}");
+    let note = "`render.path.majorant_cell` is `medium.majorant_cell` now: it was read as that";
+    assert_eq!(stderr, format!("tyndall: note: {note}\n"));
+    let Ended { status, stderr, .. } = folder.run(&["render", "../both.toml"]);
+    assert_eq!(status, Some(1), "{stderr}");
+    assert!(
+        stderr.contains("render.path.majorant_cell") && stderr.contains("medium.majorant_cell"),
+        "{stderr}"
+    );
+    // An option counts for more than the file.
+    let Ended { status, stderr, .. } =
+        folder.run(&["render", "../old.toml", "--set", "medium.majorant_cell=2", "-o", "b.png"]);
+    assert_eq!((status, stderr.contains("note")), (Some(0), true), "{stderr}");
+    let metadata = read_metadata(&folder.at("out/b.png")).expect("a picture").expect("metadata");
+    let scene: serde_json::Value =
+        serde_json::from_str(metadata.get(Metadata::SCENE).expect("a scene")).expect("JSON");
+    assert_eq!(scene["medium"]["majorant_cell"], 2);
+    assert_eq!(scene.pointer("/render/path/majorant_cell"), None);
 }
 
 #[test]

@@ -36,7 +36,8 @@ pub fn sampling(effort: &Effort, _: Level) -> Result<Vec<Row>, Failure> {
     let flat = |cell: u32, density: f64| {
         bench.scene(&json!({
             "film": { "size": [side, side] }, "medium": { "density": density },
-            "render": { "integrator": "raymarch", "max_scatter": 0, "path": { "majorant_cell": cell } },
+            "medium": { "majorant_cell": cell },
+            "render": { "integrator": "raymarch", "max_scatter": 0 },
         }))
     };
     // So thin that no ray ends early; one cell around everything is never empty.
@@ -96,7 +97,7 @@ pub fn flight(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     let mut rows = Vec::new();
     for (name, value, floor) in [("CT-like", ct(256), 5.0), ("cloud", cloud(128), 1.6)] {
         let bench = Bench::new(value, 1)?;
-        let scene = |cell: u32| bench.scene(&json!({ "render": { "path": { "majorant_cell": cell } } }));
+        let scene = |cell: u32| bench.scene(&json!({ "medium": { "majorant_cell": cell } }));
         let (global, local) = (scene(0)?, scene(8)?);
         let rays = effort.pick(100_000, 5_000);
         let run = |scene: &Scene| {

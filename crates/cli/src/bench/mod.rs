@@ -79,12 +79,31 @@ impl Row {
         })
     }
 
+    /// A row of a Markdown table.
+    fn markdown(&self) -> String {
+        let Self { row, quantity, unit, ours, paper, .. } = self;
+        let paper = paper.map_or(String::new(), |paper| paper.to_string());
+        let missed = match self.floor {
+            Some(floor) if floor >= 0.0 => *ours < floor,
+            Some(ceiling) => *ours > -ceiling,
+            None => false,
+        };
+        let ours = if missed { format!("**{ours:.3}**") } else { format!("{ours:.3}") };
+        format!("| {row} | {quantity} | {ours} | {unit} | {} | {paper} |\n", self.target())
+    }
+
     fn line(&self) -> String {
         let Self { row, quantity, unit, ours, .. } = self;
         let paper = self.paper.map_or(String::new(), |paper| format!("paper {paper}"));
         let line = format!("{row:<44} {quantity:<34} {ours:>10.3} {unit:<8} {:<10} {paper}", self.target());
         line.trim_end().to_owned() + "\n"
     }
+}
+
+/// A table for the documentation; figures that miss their target are bold.
+fn markdown(title: &str, rows: &[Row]) -> String {
+    let head = "| row | quantity | ours | unit | target | paper |\n| --- | --- | --- | --- | --- | --- |\n";
+    format!("\n### {title}\n\n{head}{}", rows.iter().map(Row::markdown).collect::<String>())
 }
 
 /// Measures the rows of one table with certain vector instructions.
@@ -124,8 +143,10 @@ pub fn run(options: &BenchOptions) -> Result<(), Failure> {
     };
     for table in tables {
         let rows = table(&effort, level)?;
-        if !options.json {
-            let title = rows.first().map_or("", |row| row.table);
+        let title = rows.first().map_or("", |row| row.table);
+        if options.markdown {
+            say(&markdown(title, &rows))?;
+        } else if !options.json {
             say(&format!("\n{title}\n{}", rows.iter().map(Row::line).collect::<String>()))?;
         }
         all.extend(rows);

@@ -15,7 +15,7 @@ pub(crate) const MOST_LANES: usize = 16;
 
 /// The steps of one track.
 #[derive(Clone, Copy, Debug, Default)]
-struct Steps {
+pub(super) struct Steps {
     /// Steps of full width.
     whole: i32,
     /// All steps, with the last one that is not.
@@ -25,15 +25,20 @@ struct Steps {
 }
 
 impl Steps {
-    fn new(track: &Track, step: f32) -> Self {
+    pub(super) fn new(track: &Track, step: f32) -> Self {
         let whole = cast::truncate(track.length / step).min(i32::MAX - 1);
         let rest = (track.length - whole as f32 * step).max(0.0);
         // A sliver of the last bit would be a step of no width.
         Self { whole, count: whole + i32::from(rest > 1e-4 * step), rest }
     }
 
+    /// All of them.
+    pub(super) fn count(&self) -> i32 {
+        self.count
+    }
+
     #[inline(always)]
-    fn midpoint(&self, k: i32, step: f32) -> f32 {
+    pub(super) fn midpoint(&self, k: i32, step: f32) -> f32 {
         let width = if k < self.whole { step } else { self.rest };
         k as f32 * step + 0.5 * width
     }

@@ -7,6 +7,7 @@ mod emptiness;
 mod free_flight;
 mod majorants;
 mod march;
+mod marched_flight;
 mod skip;
 
 pub use clip::{Clip, ClipShape};
@@ -14,6 +15,7 @@ pub use free_flight::Collision;
 pub(crate) use free_flight::FlightNotes;
 pub use majorants::{CellStretch, CellWalk, MajorantGrid};
 pub(crate) use march::{MOST_LANES, MarchNotes, PacketMarch, PacketSample};
+pub use marched_flight::MarchedCollision;
 
 use crate::math::{Interval, Ray, Vec3, cast};
 use crate::scattering::{Brdf, Event, Phase, Surface, surface_share};

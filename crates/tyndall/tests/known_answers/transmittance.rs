@@ -124,6 +124,54 @@ fn collisions_are_distributed_as_the_optical_depth_says() {
     ChiSquare::default().against_cdf(flights, cdf, 200).assert();
 }
 
+/// Distances by inverting a march are distributed as the march says, and each collision tells the density of its distance.
+#[test]
+fn marched_distances_have_the_density_that_they_tell() {
+    let scene = gaussian();
+    let medium = &*scene.medium;
+    let ray = Ray::new(Vec3::new(0.03, 0.0, 2.0), Vec3::new(0.02, 0.05, -1.0).normalize());
+    let track = medium.track(&ray, f32::INFINITY);
+    // So coarse that the march is far from the truth; the last step is not whole.
+    let step = track.length() / 13.7;
+    let borders: Vec<f32> = (0..=14_u8).map(|k| (f32::from(k) * step).min(track.length())).collect();
+    let mut depths = vec![0.0_f64];
+    for pair in borders.windows(2) {
+        let sigma_t = medium.sigma_t(track.at(0.5 * (pair[0] + pair[1])));
+        depths.push(depths[depths.len() - 1] + f64::from(sigma_t) * f64::from(pair[1] - pair[0]));
+    }
+    let through = (-depths[14]).exp();
+    let cdf = |t: f64| {
+        let k = ((t / f64::from(step)) as usize).min(13);
+        let [start, end] = [borders[k], borders[k + 1]].map(f64::from);
+        let share = ((t - start) / (end - start)).clamp(0.0, 1.0);
+        let depth = depths[k] + (depths[k + 1] - depths[k]) * share;
+        (1.0 - (-depth).exp()) / (1.0 - through)
+    };
+    let mut passed = 0;
+    let mut told = 0;
+    let flights = (0..1_000_000).filter_map(|i| {
+        let collision = medium.marched_flight(&track, Stream::new(9, [i, 0, 0]).exponential(), step);
+        passed += i32::from(collision.is_none());
+        let collision = collision?;
+        let t = f64::from(collision.t);
+        // The slope of the distribution function, away from the borders of steps.
+        let around = [t - 1e-3 * f64::from(step), t + 1e-3 * f64::from(step)];
+        if around.map(|t| (t / f64::from(step)) as usize)[0]
+            == around.map(|t| (t / f64::from(step)) as usize)[1]
+        {
+            let slope = (cdf(around[1]) - cdf(around[0])) / (around[1] - around[0]) * (1.0 - through);
+            let pdf = f64::from(collision.pdf());
+            assert!((pdf - slope).abs() < 1e-3 * slope + 1e-6, "{pdf}, the slope is {slope} at {t}");
+            told += 1;
+        }
+        Some(t)
+    });
+    ChiSquare::default().against_cdf(flights, cdf, 200).assert();
+    assert!(told > 100_000, "{told}");
+    let share = f64::from(passed) / 1e6;
+    assert!((share - through).abs() < 4.0 * (through / 1e6).sqrt(), "{share} passed, expected {through}");
+}
+
 #[test]
 fn one_global_majorant_gives_the_same_answer() {
     let n = 48;

@@ -1,0 +1,62 @@
+//! Free flight by inverting a march: the density of the distance that it draws is known, as methods need that weigh a collision
+//! again after the matter has changed.
+
+use super::march::Steps;
+use super::{Medium, Track};
+use crate::math::{Vec3, cast};
+
+/// A collision with the density at which its distance was drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MarchedCollision {
+    /// World distance inside the medium, along the track.
+    pub t: f32,
+    /// Where, in index space.
+    pub position: Vec3,
+    /// Extinction in the step of the march that the collision is in, per world unit.
+    pub sigma_t: f32,
+    /// Optical depth up to the collision, by the march.
+    pub optical_depth: f32,
+}
+
+impl MarchedCollision {
+    /// Density of the distance, per world unit: exactly that of [`Medium::marched_flight`], whatever its step.
+    #[must_use]
+    pub fn pdf(&self) -> f32 {
+        self.sigma_t * (-self.optical_depth).exp()
+    }
+}
+
+impl Medium {
+    /// Flies through so much optical depth, or out of the medium (`None`), by a march with steps of `step` world units in each
+    /// of which extinction counts as that of its middle. For an exponentially distributed depth, distances have the density
+    /// that the collision tells; it is biased by the march, unlike that of [`Self::free_flight`], which nobody knows.
+    #[must_use]
+    pub fn marched_flight(&self, track: &Track, depth: f32, step: f32) -> Option<MarchedCollision> {
+        let steps = Steps::new(track, step);
+        let (mut k, mut met) = (0, 0.0);
+        for cell in self.majorants.walk(track) {
+            if cell.most <= 0.0 {
+                // Up to the last step whose middle may lie in this cell; the loop below corrects it.
+                k = k.max(cast::truncate(cell.end / step - 0.5)).min(steps.count());
+            }
+            while k < steps.count() && steps.midpoint(k, step) < cell.end {
+                let middle = steps.midpoint(k, step);
+                let sigma_t = if cell.most > 0.0 { self.sigma_t(track.at(middle)) } else { 0.0 };
+                let start = k as f32 * step;
+                let behind = met + sigma_t * 2.0 * (middle - start);
+                if behind > depth {
+                    let t = start + (depth - met) / sigma_t;
+                    return Some(MarchedCollision {
+                        t,
+                        position: track.at(t),
+                        sigma_t,
+                        optical_depth: depth,
+                    });
+                }
+                met = behind;
+                k += 1;
+            }
+        }
+        None
+    }
+}
