@@ -3,7 +3,7 @@
 use crate::assets::{self, AssetError, Assets, Source};
 use crate::document::{self, Document, DocumentError};
 use crate::error::LiveError;
-use crate::session::Options;
+use crate::options::Options;
 use serde_json::{Value, json};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};

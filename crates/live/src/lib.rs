@@ -39,6 +39,7 @@ mod build;
 pub mod document;
 mod error;
 mod input;
+mod options;
 mod session;
 mod undo;
 
@@ -46,5 +47,6 @@ pub use assets::{Assets, Source};
 pub use build::{Built, SceneError};
 pub use error::LiveError;
 pub use input::{Input, LoadedScene, read_text};
-pub use session::{EditReport, LiveSession, Options};
+pub use options::Options;
+pub use session::{EditReport, LiveSession};
 pub use tyndall::session::{Budget, Progress};

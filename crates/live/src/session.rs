@@ -6,6 +6,7 @@ use crate::build::Built;
 use crate::document::{self, Document};
 use crate::error::LiveError;
 use crate::input::{Input, LoadedScene, of_assets};
+use crate::options::Options;
 use crate::undo::UndoList;
 use serde_json::Value;
 use std::borrow::Cow;
@@ -16,29 +17,6 @@ use tyndall::film::{Film, Image};
 use tyndall::integrator::{MethodReport, Resources, method_of};
 use tyndall::scene::{Difference, Scene};
 use tyndall::session::{Budget, Progress, Session};
-use tyndall::simd::Level;
-
-/// What a live session runs on.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Threads that load, build and render.
-    pub threads: Arc<rayon::ThreadPool>,
-    /// Vector instructions.
-    pub level: Level,
-    /// Whether edits are to come, so that it pays to keep what makes them fast.
-    pub edits: bool,
-}
-
-impl Options {
-    /// A thread for each processor, the widest vector instructions, ready for edits.
-    ///
-    /// # Errors
-    /// If the system gives no threads.
-    pub fn new() -> Result<Self, rayon::ThreadPoolBuildError> {
-        let threads = Arc::new(rayon::ThreadPoolBuilder::new().build()?);
-        Ok(Self { threads, level: Level::best(), edits: true })
-    }
-}
 
 /// A scene under edit, shown as it gets better.
 ///

@@ -1,7 +1,7 @@
 //! The pictures to look at when a comparison fails.
 
 use crate::cast::level;
-use crate::picture::{Comparison, Picture};
+use crate::picture::Picture;
 use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::path::Path;
@@ -11,20 +11,27 @@ const UNCLIPPED: f64 = 0.99;
 
 type Pixel = [u8; 3];
 
+/// How far apart two pictures are, block by block.
+pub(crate) struct Error {
+    /// Edge of a block in pixels.
+    pub block: usize,
+    /// Blocks in a row.
+    pub columns: usize,
+    /// Per block from -1, too dark, to 1, too bright; farther is shown as these.
+    pub signed: Vec<f64>,
+}
+
 /// Writes image, reference and error into a folder, which is made if it is not there.
-pub fn write(comparison: &Comparison<'_>, folder: &Path) -> io::Result<()> {
+pub(crate) fn write(image: &Picture, reference: &Picture, error: &Error, folder: &Path) -> io::Result<()> {
     fs::create_dir_all(folder)?;
-    let Comparison { image, reference, .. } = *comparison;
     let white = white(reference);
     for (name, picture) in [("image.png", image), ("reference.png", reference)] {
         let pixels = picture.mean.iter().map(|rgb| rgb.map(|x| level(srgb(f64::from(x) / white))));
         write_png(&folder.join(name), picture, pixels)?;
     }
     let pixels = (0..image.width * image.height).map(|i| {
-        let (x, y) = (i % image.width / comparison.block, i / image.width / comparison.block);
-        let worst =
-            comparison.z[y * comparison.columns + x].into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs()));
-        diverging(worst.unwrap_or(0.0) / comparison.threshold)
+        let (x, y) = (i % image.width / error.block, i / image.width / error.block);
+        diverging(error.signed[y * error.columns + x])
     });
     write_png(&folder.join("error.png"), image, pixels)
 }

@@ -48,6 +48,7 @@
 
 mod cast;
 mod chi_square;
+mod comparison;
 pub mod damage;
 mod failure;
 mod fit;
@@ -60,9 +61,10 @@ mod split_mix;
 mod z_test;
 
 pub use chi_square::ChiSquare;
+pub use comparison::{Comparison, Worst};
 pub use fit::{Fault, Fit};
 pub use limits::within_limits;
-pub use picture::{Comparison, Picture, Worst};
+pub use picture::Picture;
 pub use significance::{SIGNIFICANCE, sidak};
 pub use split_mix::SplitMix;
 pub use z_test::{Mean, ZTest};

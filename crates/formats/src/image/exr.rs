@@ -16,7 +16,7 @@ use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel};
 use tyndall::math::Rgb;
 
 use super::error::EncodeFailure;
-use super::map::{Map, MapFailure};
+use super::texels::{Map, MapFailure};
 use super::{Metadata, Picture};
 
 const ENCODING: Encoding = Encoding {

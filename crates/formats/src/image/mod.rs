@@ -32,11 +32,13 @@ mod map;
 mod metadata;
 mod png;
 mod radiance;
+mod texels;
 mod tiff;
 
 pub use error::ImageError;
-pub use map::{Map, read_map};
+pub use map::read_map;
 pub use metadata::Metadata;
+pub use texels::Map;
 
 /// The kinds of picture, for messages.
 const EXTENSIONS: &str = ".png, .jpg, .jpeg, .tif, .tiff or .exr";

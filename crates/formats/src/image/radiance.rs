@@ -4,7 +4,7 @@ use std::io::{BufRead, Read};
 
 use tyndall::math::{Rgb, cast};
 
-use super::map::{Map, MapFailure};
+use super::texels::{Map, MapFailure};
 
 /// Longest header that is read.
 const HEADER_LIMIT: u64 = 1 << 20;

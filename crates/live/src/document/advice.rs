@@ -1,6 +1,7 @@
 //! How to mend an unknown word: the nearest known one, or that it comes with a later version.
 
-use super::node::{Node, TAG};
+use super::node::Node;
+use super::schema::TAG;
 use tyndall::integrator::DEFAULT_METHOD;
 
 /// Tables of the document that this version does not have yet, by their path.

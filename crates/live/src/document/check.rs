@@ -8,7 +8,8 @@ use serde_json::{Map, Number, Value};
 use super::advice::{unknown_key, unknown_word};
 use super::describe::{describe, length};
 use super::error::{DocumentError, Problem, Problems, describe_value, join};
-use super::node::{Node, TAG};
+use super::node::Node;
+use super::schema::TAG;
 use tyndall::math::cast;
 use tyndall::message::quoted;
 

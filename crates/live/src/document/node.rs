@@ -2,14 +2,11 @@
 
 use serde_json::{Map, Value};
 
-use super::schema;
+use super::schema::{self, TAG};
 
 /// The schema of one place of the document.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node(&'static Value);
-
-/// The key that tells the variants of a tagged union apart.
-pub(super) const TAG: &str = "type";
 
 impl Node {
     /// The schema of the whole document.

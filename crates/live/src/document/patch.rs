@@ -2,7 +2,8 @@
 
 use serde_json::{Map, Value};
 
-use super::node::{Node, TAG};
+use super::node::Node;
+use super::schema::TAG;
 
 /// The document after an edit.
 ///

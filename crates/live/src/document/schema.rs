@@ -9,8 +9,10 @@ use schemars::transform::RecursiveTransform;
 use serde_json::{Map, Value};
 
 use super::Document;
-use super::node::TAG;
 use super::number::shorten;
+
+/// The key that tells the variants of a tagged union apart.
+pub(super) const TAG: &str = "type";
 
 /// The JSON Schema of the scene document.
 #[must_use]

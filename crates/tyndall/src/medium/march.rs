@@ -4,6 +4,7 @@
 //! function, so skipping what is empty leaves every sample where it was and changes no bit. What skipping takes away is
 //! decided for each sample by the cell that it lies in.
 
+use super::march_notes::MarchNotes;
 use super::skip::Skip;
 use super::{Medium, Track};
 use crate::math::{Ray, cast};
@@ -96,35 +97,6 @@ impl Medium {
         }
         if along.count > 0 { along.take() } else { along.thickness() }
     }
-}
-
-/// What hears of all that the lanes of a packet read.
-pub(crate) trait MarchNotes<S: Lanes> {
-    /// Whether what is empty is crossed cell by cell, so that each is told.
-    const EACH_CELL: bool;
-
-    /// Values that some lanes read.
-    fn values(&mut self, simd: S, lanes: S::mask32s, values: S::f32s);
-
-    /// Values that a lane reads about its sample.
-    fn values_about(&mut self, simd: S, lane: usize, read: S::mask32s, values: S::f32s);
-
-    /// Numbers of the empty cells that some lanes leap over, x fastest.
-    fn cells(&mut self, simd: S, lanes: S::mask32s, cells: S::u32s);
-}
-
-/// Nobody listens.
-impl<S: Lanes> MarchNotes<S> for () {
-    const EACH_CELL: bool = false;
-
-    #[inline(always)]
-    fn values(&mut self, _: S, _: S::mask32s, _: S::f32s) {}
-
-    #[inline(always)]
-    fn values_about(&mut self, _: S, _: usize, _: S::mask32s, _: S::f32s) {}
-
-    #[inline(always)]
-    fn cells(&mut self, _: S, _: S::mask32s, _: S::u32s) {}
 }
 
 /// A march along a packet of tracks, at most one per lane. Each lane takes the steps of its own track that may hold

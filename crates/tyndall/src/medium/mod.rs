@@ -7,6 +7,7 @@ mod emptiness;
 mod free_flight;
 mod majorants;
 mod march;
+mod march_notes;
 mod marched_flight;
 mod skip;
 
@@ -14,7 +15,8 @@ pub use clip::{Clip, ClipShape};
 pub use free_flight::Collision;
 pub(crate) use free_flight::FlightNotes;
 pub use majorants::{CellStretch, CellWalk, MajorantGrid};
-pub(crate) use march::{MOST_LANES, MarchNotes, PacketMarch, PacketSample};
+pub(crate) use march::{MOST_LANES, PacketMarch, PacketSample};
+pub(crate) use march_notes::MarchNotes;
 pub use marched_flight::MarchedCollision;
 
 use crate::math::{Interval, Ray, Vec3, cast};

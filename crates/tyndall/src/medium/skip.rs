@@ -1,7 +1,7 @@
 //! How lanes leap over what is empty.
 
 use super::Medium;
-use super::march::MarchNotes;
+use super::march_notes::MarchNotes;
 use crate::simd::Lanes;
 use fearless_simd::prelude::*;
 

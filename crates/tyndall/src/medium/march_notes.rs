@@ -1,0 +1,32 @@
+//! What a march tells of all that it reads.
+
+use crate::simd::Lanes;
+
+/// What hears of all that the lanes of a packet read.
+pub(crate) trait MarchNotes<S: Lanes> {
+    /// Whether what is empty is crossed cell by cell, so that each is told.
+    const EACH_CELL: bool;
+
+    /// Values that some lanes read.
+    fn values(&mut self, simd: S, lanes: S::mask32s, values: S::f32s);
+
+    /// Values that a lane reads about its sample.
+    fn values_about(&mut self, simd: S, lane: usize, read: S::mask32s, values: S::f32s);
+
+    /// Numbers of the empty cells that some lanes leap over, x fastest.
+    fn cells(&mut self, simd: S, lanes: S::mask32s, cells: S::u32s);
+}
+
+/// Nobody listens.
+impl<S: Lanes> MarchNotes<S> for () {
+    const EACH_CELL: bool = false;
+
+    #[inline(always)]
+    fn values(&mut self, _: S, _: S::mask32s, _: S::f32s) {}
+
+    #[inline(always)]
+    fn values_about(&mut self, _: S, _: usize, _: S::mask32s, _: S::f32s) {}
+
+    #[inline(always)]
+    fn cells(&mut self, _: S, _: S::mask32s, _: S::u32s) {}
+}
