@@ -3,7 +3,7 @@
 use crate::Failure;
 use serde_json::Value;
 use std::path::Path;
-use tyndall::message::{excerpt, place, quoted};
+use tyndall::message::{excerpt, path_name, quoted};
 use tyndall_live::document::{self, DocumentError};
 use tyndall_live::read_text;
 
@@ -24,15 +24,15 @@ pub fn read(path: &Path) -> Result<Vec<Value>, Failure> {
         document::value_from_json(&read_text(path, what).map_err(Failure::input)?).map_err(|e| match e {
             DocumentError::Syntax { line, column, message, .. } => Failure::input(format!(
                 "{}: line {line}, column {column}: {message}; expected {what} in JSON",
-                place(path)
+                path_name(path)
             )),
-            other => Failure::input(format!("{}: {other}", place(path))),
+            other => Failure::input(format!("{}: {other}", path_name(path))),
         })?;
     match value {
         Value::Array(edits) => Ok(edits),
         other => Err(Failure::input(format!(
             "{}: found {}, expected a list of edits: [{{\"name\": ..., \"patch\": {{...}}}}, ...]",
-            place(path),
+            path_name(path),
             kind(&other)
         ))),
     }

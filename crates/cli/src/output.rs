@@ -29,7 +29,7 @@ pub fn check(pictures: &[PathBuf], statistics: Option<&Path>) -> Result<(), Fail
     let mut taken = BTreeSet::new();
     for place in pictures.iter().map(PathBuf::as_path).chain(statistics) {
         if !taken.insert(absolute(place)) {
-            let place = tyndall::message::place(place);
+            let place = tyndall::message::path_name(place);
             return Err(Failure::usage(format!(
                 "`{place}` is to be written twice; expected a place of its own for each output"
             )));
@@ -139,7 +139,7 @@ pub fn statistics(place: &Path, value: &serde_json::Value) -> Result<(), Failure
 }
 
 fn unwritable(place: &Path, error: &std::io::Error) -> String {
-    let place = tyndall::message::place(place);
+    let place = tyndall::message::path_name(place);
     format!(
         "{place}: statistics cannot be written: {error}; name a file in a folder that takes files, or `-`"
     )

@@ -10,7 +10,7 @@ use std::path::Path;
 use std::time::Instant;
 use tyndall::film::Image;
 use tyndall::integrator::{KeptItems, WorkShare};
-use tyndall::message::{excerpt, place, sentence};
+use tyndall::message::{excerpt, path_name, sentence};
 use tyndall_live::{Budget, Input, LiveSession, Options};
 
 /// Plays EDITS against SCENE.
@@ -46,9 +46,9 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
     let mut played = Ok(());
     for (number, edit) in edits.iter().enumerate() {
         let report = Edit::read(edit, number)
-            .map_err(|e| Failure::input(format!("{}: {e}", place(&options.edits))))
+            .map_err(|e| Failure::input(format!("{}: {e}", path_name(&options.edits))))
             .and_then(|edit| {
-                let at = format!("{}: {}", place(&options.edits), edit.at);
+                let at = format!("{}: {}", path_name(&options.edits), edit.at);
                 play(&mut live, &edit, &at, &run).map(|report| (edit.name, report))
             });
         match report {

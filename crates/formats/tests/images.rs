@@ -209,7 +209,7 @@ fn refused(path: &Path) -> String {
     let error = write(path, &picture(false), &DISPLAY, &small()).expect_err("a place that refuses");
     let message = error.to_string();
     assert_eq!(list(folder), before, "left behind: {message}");
-    assert!(message.contains(&tyndall::message::place(path)), "{message}");
+    assert!(message.contains(&tyndall::message::path_name(path)), "{message}");
     message
 }
 

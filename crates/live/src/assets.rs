@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tyndall::light::{Map, MapError};
-use tyndall::message::place;
+use tyndall::message::path_name;
 use tyndall::volume::procedural::{Field, Kind};
 use tyndall::volume::{Bricks, GridError, Interpolation, Volume};
 use tyndall_formats::image::{ImageError, read_map};
@@ -67,7 +67,7 @@ pub enum AssetError {
         source: ImageError,
     },
     /// An environment map's content.
-    #[error("`lights.{light}.map`: {}: {source}", place(.path))]
+    #[error("`lights.{light}.map`: {}: {source}", path_name(.path))]
     Map {
         /// Number of the light.
         light: usize,

@@ -7,7 +7,7 @@ use crate::options::Options;
 use serde_json::{Value, json};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
-use tyndall::message::place;
+use tyndall::message::path_name;
 use tyndall_formats::image::{Metadata, read_metadata};
 
 /// A document as it was found, before any override.
@@ -67,7 +67,7 @@ impl Input {
             _ => (of_volume(path)?, true),
         };
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let mut input = Self { value, folder, bare, name: place(path), notes: Vec::new() };
+        let mut input = Self { value, folder, bare, name: path_name(path), notes: Vec::new() };
         input.notes = in_file(path, document::move_old_keys(&mut input.value))?;
         Ok(input)
     }
@@ -159,11 +159,11 @@ fn of_volume(path: &Path) -> Result<Value, LiveError> {
 
 /// Says of which file the trouble is.
 fn in_file<T>(path: &Path, result: Result<T, DocumentError>) -> Result<T, LiveError> {
-    result.map_err(|source| LiveError::Document { at: place(path), source })
+    result.map_err(|source| LiveError::Document { at: path_name(path), source })
 }
 
 fn file(path: &Path, problem: impl Display) -> LiveError {
-    LiveError::File { at: place(path), problem: problem.to_string() }
+    LiveError::File { at: path_name(path), problem: problem.to_string() }
 }
 
 /// The text of a file that should be `what`.

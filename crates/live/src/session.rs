@@ -11,7 +11,6 @@ use crate::undo::UndoList;
 use serde_json::Value;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tyndall::film::{Film, Image};
 use tyndall::integrator::{MethodReport, Resources, method_of};

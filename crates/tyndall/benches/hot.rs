@@ -35,7 +35,7 @@ fn medium(kind: Kind) -> Medium {
 const KINDS: [Kind; 2] = [Kind::Cloud, Kind::Shells];
 
 /// Places and tracks all over the box.
-fn places() -> impl Iterator<Item = Vec3> {
+fn positions() -> impl Iterator<Item = Vec3> {
     let mut stream = Stream::new(1, [2, 3, 4]);
     std::iter::repeat_with(move || Vec3::new(stream.uniform(), stream.uniform(), stream.uniform()) * 127.0)
 }
@@ -49,16 +49,16 @@ fn track(medium: &Medium, [from, to]: [Vec3; 2]) -> Track {
 #[divan::bench(args = KINDS)]
 fn value(bencher: Bencher, kind: Kind) {
     let medium = medium(kind);
-    let mut places = places();
-    let next = move || places.next().expect("endless");
-    bencher.with_inputs(next).bench_local_values(|place| medium.volume().value(place));
+    let mut positions = positions();
+    let next = move || positions.next().expect("endless");
+    bencher.with_inputs(next).bench_local_values(|position| medium.volume().value(position));
 }
 
 #[divan::bench]
 fn opacity(bencher: Bencher) {
     let medium = medium(Kind::Cloud);
-    let mut places = places();
-    let next = move || places.next().expect("endless").x / 127.0;
+    let mut positions = positions();
+    let next = move || positions.next().expect("endless").x / 127.0;
     bencher.with_inputs(next).bench_local_values(|value| medium.transfer().opacity(value));
 }
 
@@ -70,9 +70,9 @@ fn numbers_of_a_bounce() -> f32 {
 #[divan::bench(args = KINDS)]
 fn free_flight(bencher: Bencher, kind: Kind) {
     let medium = medium(kind);
-    let mut places = places();
+    let mut positions = positions();
     let mut stream = Stream::new(9, [0, 0, 0]);
-    let next = || track(&medium, [(); 2].map(|()| places.next().expect("endless")));
+    let next = || track(&medium, [(); 2].map(|()| positions.next().expect("endless")));
     bencher.with_inputs(next).bench_local_values(|track| {
         let first = stream.exponential();
         medium.free_flight(&track, first, &mut stream)
@@ -82,17 +82,17 @@ fn free_flight(bencher: Bencher, kind: Kind) {
 #[divan::bench(args = Level::available())]
 fn transmittance(bencher: Bencher, level: Level) {
     let medium = medium(Kind::Cloud);
-    let mut places = places();
+    let mut positions = positions();
     let mut stream = Stream::new(9, [0, 0, 0]);
-    let next = || track(&medium, [(); 2].map(|()| places.next().expect("endless")));
+    let next = || track(&medium, [(); 2].map(|()| positions.next().expect("endless")));
     bencher.with_inputs(next).bench_local_values(|track| medium.transmittance(level, &track, &mut stream));
 }
 
 #[divan::bench(args = Level::available())]
 fn optical_thickness(bencher: Bencher, level: Level) {
     let medium = medium(Kind::Shells);
-    let mut places = places();
-    let next = || track(&medium, [(); 2].map(|()| places.next().expect("endless")));
+    let mut positions = positions();
+    let next = || track(&medium, [(); 2].map(|()| positions.next().expect("endless")));
     bencher
         .with_inputs(next)
         .bench_local_values(|track| medium.optical_thickness(level, &track, 0.5, f32::INFINITY));

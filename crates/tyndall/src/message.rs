@@ -25,7 +25,7 @@ pub fn sentence(text: &str) -> String {
 
 /// A path: whole where it has up to 240 characters, else its beginning and its end, which tell it best.
 #[must_use]
-pub fn place(path: &Path) -> String {
+pub fn path_name(path: &Path) -> String {
     shown(&path.to_string_lossy(), 80, 160)
 }
 
@@ -55,7 +55,7 @@ mod tests {
     fn plain_words_stay_as_they_are() {
         for text in ["", "medium.density", "C:\\data\\Schädel 頭.nrrd", "it's \"so\""] {
             assert_eq!(excerpt(text), text);
-            assert_eq!(place(Path::new(text)), text);
+            assert_eq!(path_name(Path::new(text)), text);
         }
         assert_eq!(quoted("it's \"so\""), "\"it's \\\"so\\\"\"");
     }
@@ -65,7 +65,7 @@ mod tests {
         assert_eq!(excerpt("a\u{1b}[31m\nb\0\u{202e}"), "a\\u{1b}[31m\\nb\\u{0}\\u{202e}");
         assert_eq!(quoted("\u{1b}"), "\"\\u{1b}\"");
         assert_eq!(sentence("two\n  lines\u{7}"), "two lines\\u{7}");
-        assert_eq!(place(Path::new("a\nb.nrrd")), "a\\nb.nrrd");
+        assert_eq!(path_name(Path::new("a\nb.nrrd")), "a\\nb.nrrd");
     }
 
     #[test]
@@ -75,9 +75,9 @@ mod tests {
         assert_eq!(quoted(&long), format!("\"{}...\"", "\u{e9}".repeat(60)));
         assert_eq!(sentence(&long).chars().count(), 303);
         let long = format!("/begin/{}/end.nrrd", "x".repeat(500));
-        let shown = place(Path::new(&long));
+        let shown = path_name(Path::new(&long));
         assert!(shown.starts_with("/begin/xx") && shown.ends_with("xx/end.nrrd"), "{shown}");
         assert_eq!(shown.chars().count(), 243);
-        assert_eq!(place(Path::new(&long[..240])), long[..240]);
+        assert_eq!(path_name(Path::new(&long[..240])), long[..240]);
     }
 }

@@ -3,13 +3,13 @@
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
 use tyndall::light::BRIGHTEST;
-use tyndall::message::{excerpt, place, sentence};
+use tyndall::message::{excerpt, path_name, sentence};
 
 /// A picture or map that could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The file's name does not tell a known kind.
-    #[error("{}: {found}; give it one of {known}", place(path))]
+    #[error("{}: {found}; give it one of {known}", path_name(path))]
     Extension {
         /// The file.
         path: PathBuf,
@@ -19,7 +19,7 @@ pub enum ImageError {
         known: &'static str,
     },
     /// The disk does not take the file.
-    #[error("{}: cannot write the picture: {source}; {mend}", place(path))]
+    #[error("{}: cannot write the picture: {source}; {mend}", path_name(path))]
     Unwritable {
         /// The file.
         path: PathBuf,
@@ -29,7 +29,7 @@ pub enum ImageError {
         mend: String,
     },
     /// The disk does not give the file.
-    #[error("{}: cannot read the picture: {source}; {mend}", place(path))]
+    #[error("{}: cannot read the picture: {source}; {mend}", path_name(path))]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -39,7 +39,7 @@ pub enum ImageError {
         mend: String,
     },
     /// The picture has more pixels than the kind of file, or this program, can hold.
-    #[error("{}: {width} x {height} pixels, expected at most {limit}; {mend}", place(path))]
+    #[error("{}: {width} x {height} pixels, expected at most {limit}; {mend}", path_name(path))]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -53,7 +53,7 @@ pub enum ImageError {
         mend: &'static str,
     },
     /// The file's library refused the picture.
-    #[error("{}: cannot encode the picture: {}; try another kind of file", place(path), sentence(reason))]
+    #[error("{}: cannot encode the picture: {}; try another kind of file", path_name(path), sentence(reason))]
     Encode {
         /// The file.
         path: PathBuf,
@@ -61,7 +61,7 @@ pub enum ImageError {
         reason: String,
     },
     /// The file's content is damaged, or of a variant that is not read.
-    #[error("{}: not a readable {kind} file: {}; copy or save it again", place(path), sentence(reason))]
+    #[error("{}: not a readable {kind} file: {}; copy or save it again", path_name(path), sentence(reason))]
     Malformed {
         /// The file.
         path: PathBuf,
@@ -73,7 +73,7 @@ pub enum ImageError {
     /// The file is not one of the kinds that carry metadata.
     #[error(
         "{}: found no picture, expected PNG, JPEG, TIFF or OpenEXR content; name a picture that Tyndall wrote",
-        place(path)
+        path_name(path)
     )]
     NotAPicture {
         /// The file.
@@ -82,7 +82,7 @@ pub enum ImageError {
     /// A texel of a map is not a radiance.
     #[error(
         "{}: texel ({x}, {y}) is {value:?}, expected values from 0 to {BRIGHTEST:e}; repair it in the map",
-        place(path)
+        path_name(path)
     )]
     Texel {
         /// The file.
@@ -108,8 +108,8 @@ impl ImageError {
     pub(super) fn unwritable(path: &Path, source: Error) -> Self {
         let folder = crate::atomic::folder_of(path);
         let mend = match source.kind() {
-            ErrorKind::NotFound => format!("create the folder {} first", place(folder)),
-            ErrorKind::NotADirectory => format!("choose another place: {} is no folder", place(folder)),
+            ErrorKind::NotFound => format!("create the folder {} first", path_name(folder)),
+            ErrorKind::NotADirectory => format!("choose another place: {} is no folder", path_name(folder)),
             ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
                 "choose a file and folder that you may write to".to_owned()
             }

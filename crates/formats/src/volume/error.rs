@@ -2,7 +2,7 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
-use tyndall::message::{excerpt, place, sentence};
+use tyndall::message::{excerpt, path_name, sentence};
 use tyndall::volume::{GridError, VolumeError};
 
 /// The kinds that [`super::read`] knows, for messages.
@@ -14,7 +14,7 @@ pub(super) const KINDS: &str =
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The operating system refused.
-    #[error("{}: cannot be read: {source}", place(.path))]
+    #[error("{}: cannot be read: {source}", path_name(.path))]
     Io {
         /// The file.
         path: PathBuf,
@@ -22,7 +22,7 @@ pub enum ReadError {
         source: io::Error,
     },
     /// A folder, a pipe or a device.
-    #[error("{}: {found}, expected a regular file", place(.path))]
+    #[error("{}: {found}, expected a regular file", path_name(.path))]
     NotAFile {
         /// What was asked for.
         path: PathBuf,
@@ -30,19 +30,19 @@ pub enum ReadError {
         found: &'static str,
     },
     /// No byte in it.
-    #[error("{}: the file is empty, expected a volume", place(.path))]
+    #[error("{}: the file is empty, expected a volume", path_name(.path))]
     Empty {
         /// The file.
         path: PathBuf,
     },
     /// Neither the first bytes nor the extension tell a kind.
-    #[error("{}: no kind of volume that is known here; known are {KINDS}; for raw samples state their layout", place(.path))]
+    #[error("{}: no kind of volume that is known here; known are {KINDS}; for raw samples state their layout", path_name(.path))]
     UnknownKind {
         /// The file.
         path: PathBuf,
     },
     /// A header says something that cannot be.
-    #[error("{}: {key}: found {found}, expected {expected}", place(.path))]
+    #[error("{}: {key}: found {found}, expected {expected}", path_name(.path))]
     Header {
         /// The file.
         path: PathBuf,
@@ -54,7 +54,7 @@ pub enum ReadError {
         expected: String,
     },
     /// A valid file of a sort that is not read here.
-    #[error("{}: {} is not supported; {mend}", place(.path), sentence(.what))]
+    #[error("{}: {} is not supported; {mend}", path_name(.path), sentence(.what))]
     Unsupported {
         /// The file.
         path: PathBuf,
@@ -64,7 +64,7 @@ pub enum ReadError {
         mend: String,
     },
     /// Fewer samples than the header asks for.
-    #[error("{}: {found} bytes of samples, expected {expected} by the header; the file is cut short or its header is wrong", place(.path))]
+    #[error("{}: {found} bytes of samples, expected {expected} by the header; the file is cut short or its header is wrong", path_name(.path))]
     Short {
         /// The file that holds the samples.
         path: PathBuf,
@@ -74,7 +74,7 @@ pub enum ReadError {
         expected: u64,
     },
     /// The compressed stream or the text of the samples is damaged.
-    #[error("{}: the samples are damaged: {}", place(.path), sentence(.message))]
+    #[error("{}: the samples are damaged: {}", path_name(.path), sentence(.message))]
     Damaged {
         /// The file that holds the samples.
         path: PathBuf,
@@ -82,7 +82,7 @@ pub enum ReadError {
         message: String,
     },
     /// The samples would not fit.
-    #[error("{}: needs {needed} bytes of memory, but {available} are available; crop or downsample it", place(.path))]
+    #[error("{}: needs {needed} bytes of memory, but {available} are available; crop or downsample it", path_name(.path))]
     Memory {
         /// The file.
         path: PathBuf,
@@ -92,7 +92,7 @@ pub enum ReadError {
         available: u64,
     },
     /// The file that a header names cannot be read.
-    #[error("{}: its data file: {source}", place(.path))]
+    #[error("{}: its data file: {source}", path_name(.path))]
     DataFile {
         /// The header's file.
         path: PathBuf,
@@ -100,7 +100,7 @@ pub enum ReadError {
         source: Box<ReadError>,
     },
     /// The data values are too large to be rendered.
-    #[error("{}: values from {:e} to {:e}, expected at most {:e} in size; rescale them", place(.path), .range[0], .range[1], f32::MAX)]
+    #[error("{}: values from {:e} to {:e}, expected at most {:e} in size; rescale them", path_name(.path), .range[0], .range[1], f32::MAX)]
     Values {
         /// The file.
         path: PathBuf,
@@ -108,7 +108,7 @@ pub enum ReadError {
         range: [f64; 2],
     },
     /// The header's geometry cannot be.
-    #[error("{}: {source}", place(.path))]
+    #[error("{}: {source}", path_name(.path))]
     Grid {
         /// The file.
         path: PathBuf,
@@ -116,7 +116,7 @@ pub enum ReadError {
         source: GridError,
     },
     /// Samples and grid make no volume.
-    #[error("{}: {source}", place(.path))]
+    #[error("{}: {source}", path_name(.path))]
     Volume {
         /// The file.
         path: PathBuf,

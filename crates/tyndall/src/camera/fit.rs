@@ -68,7 +68,7 @@ pub fn fit(grid: &Grid, view: AutoView, up: Option<Vec3>, lens: FitLens, size: [
     let up = chosen_up.filter(|up| up.cross(outwards).length() > 1e-3 * up.length()).unwrap_or(up);
 
     let middle = grid.world_bounds().center();
-    // From the directions alone: far from the origin, or far from the volume, places would have lost them.
+    // From the directions alone: far from the origin, or far from the volume, positions would have lost the bits.
     let frame = upright(-outwards, up);
     let corners = grid.world_corners().map(|corner| frame.to_local(corner - middle));
     let aspect = size[0] as f32 / size[1] as f32;
@@ -79,7 +79,7 @@ pub fn fit(grid: &Grid, view: AutoView, up: Option<Vec3>, lens: FitLens, size: [
         FitLens::Perspective { fov, aperture, focus } => {
             let tan = (0.5 * fov.to_radians()).tan();
             let distance = most(&|corner| needed(corner) / tan - corner.z);
-            // Zooming narrows the view and keeps the place, so that the perspective stays and the
+            // Zooming narrows the view and keeps the position, so that the perspective stays and the
             // camera never enters the volume.
             let fov = 2.0 * (tan / view.zoom).atan().to_degrees();
             (distance, Lens::Perspective { fov, aperture, focus: focus.unwrap_or(distance) })

@@ -1,4 +1,4 @@
-//! Cameras: places on the film to rays.
+//! Cameras: from film positions to rays.
 
 mod fit;
 
@@ -63,7 +63,7 @@ impl Camera {
         self.lens
     }
 
-    /// The ray through a film place, in pixels from the top left of a film of `size` pixels, and a place
+    /// The ray through a film position, in pixels from the top left of a film of `size` pixels, and a position
     /// on the lens in the unit square.
     #[inline]
     #[must_use]

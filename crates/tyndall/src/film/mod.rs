@@ -97,7 +97,10 @@ impl Tile {
     pub fn next(&self, most: usize) -> (impl ExactSizeIterator<Item = [u32; 2]>, u32) {
         let last = self.order.len().min(self.ahead + most);
         let [x, y] = self.origin;
-        (self.order[self.ahead..last].iter().map(move |place| [x + place[0], y + place[1]]), self.samples)
+        (
+            self.order[self.ahead..last].iter().map(move |position| [x + position[0], y + position[1]]),
+            self.samples,
+        )
     }
 
     /// Adds the sample of the pixel whose turn it is.
@@ -118,9 +121,9 @@ impl Tile {
 
 /// The order of a tile's pixels.
 fn order([width, height]: [u32; 2]) -> Arc<[[u32; 2]]> {
-    let mut places: Vec<_> = (0..width * height).map(|i| [i % width, i / width]).collect();
-    places.sort_by_key(|&[x, y]| (y / BLOCK, x / BLOCK, y, x));
-    places.into()
+    let mut positions: Vec<_> = (0..width * height).map(|i| [i % width, i / width]).collect();
+    positions.sort_by_key(|&[x, y]| (y / BLOCK, x / BLOCK, y, x));
+    positions.into()
 }
 
 /// A picture in the making.
@@ -198,8 +201,10 @@ impl Film {
     fn pixels(&self) -> impl Iterator<Item = ([u32; 2], f64, &Pixel)> {
         self.tiles.iter().flat_map(|tile| {
             let [x, y] = tile.origin;
-            let places = tile.order.iter().zip(&tile.pixels).enumerate();
-            places.map(move |(i, (place, pixel))| ([x + place[0], y + place[1]], tile.samples_of(i), pixel))
+            let positions = tile.order.iter().zip(&tile.pixels).enumerate();
+            positions.map(move |(i, (position, pixel))| {
+                ([x + position[0], y + position[1]], tile.samples_of(i), pixel)
+            })
         })
     }
 

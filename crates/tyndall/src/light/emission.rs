@@ -20,11 +20,11 @@ const CAUTION: f32 = 0.1;
 /// A point of glowing matter, drawn by power.
 struct Glow {
     /// Index space.
-    place: Vec3,
+    position: Vec3,
     sigma_t: f32,
     /// Emitted radiance per world unit of length.
     emitted: Rgb,
-    /// Density of the place, per world volume.
+    /// Density of the position, per world volume.
     per_volume: f32,
 }
 
@@ -40,7 +40,7 @@ pub struct Emission {
 /// Cells in which matter may glow, whatever its density.
 #[derive(Debug)]
 struct GlowingCells {
-    places: Arc<Cells>,
+    positions: Arc<Cells>,
     /// Their numbers, ascending.
     numbers: Vec<usize>,
     bounds: Vec<Bounds>,
@@ -54,22 +54,22 @@ impl GlowingCells {
     /// In parallel on the current pool.
     fn new(medium: &Medium) -> Self {
         let grid = medium.volume().grid();
-        let places = medium.volume().cells_of(CELL);
+        let positions = medium.volume().cells_of(CELL);
         let glowing = |(number, &values): (usize, &[f32; 2])| {
             let most = medium.transfer().emission_bound(values);
             (most > 0.0).then(|| {
-                let bounds = places.cell_bounds(number, &grid.index_bounds());
+                let bounds = positions.cell_bounds(number, &grid.index_bounds());
                 let emitted = (1.0 - CAUTION) * mean_emission(medium, &bounds) + CAUTION * most;
                 (number, bounds, emitted)
             })
         };
-        let cells: Vec<_> = places.ranges().par_iter().enumerate().filter_map(glowing).collect();
+        let cells: Vec<_> = positions.ranges().par_iter().enumerate().filter_map(glowing).collect();
         Self {
             numbers: cells.iter().map(|c| c.0).collect(),
             bounds: cells.iter().map(|c| c.1).collect(),
             emitted: cells.iter().map(|c| c.2).collect(),
             voxel_volume: grid.voxel_size().powi(3),
-            places,
+            positions,
         }
     }
 
@@ -107,7 +107,7 @@ impl Emission {
 
     /// Whether points are drawn as from the other: each cell with the same chance.
     #[must_use]
-    pub fn same_places(&self, other: &Self) -> bool {
+    pub fn same_cells(&self, other: &Self) -> bool {
         let (here, there) = (&*self.glowing, &*other.glowing);
         Arc::ptr_eq(&self.cells, &other.cells)
             || (here.numbers == there.numbers && self.cells == other.cells && here.bounds == there.bounds)
@@ -127,7 +127,7 @@ impl Emission {
         let choice = stream.uniform();
         let u = Vec3::new(stream.uniform(), stream.uniform(), stream.uniform());
         let glow = self.glow(medium, choice, u)?;
-        let to_light = medium.volume().grid().index_to_world(glow.place) - from;
+        let to_light = medium.volume().grid().index_to_world(glow.position) - from;
         let squared = to_light.length_squared();
         if squared == 0.0 {
             return None;
@@ -143,37 +143,37 @@ impl Emission {
 
     /// Starts a light path from a glowing point to any side; `None` where the point drawn does not glow.
     ///
-    /// `u[0]` and `u[1]` decide the direction, `u[2]` the cell, `u[3]` and the stream the place in it. The flux has its
+    /// `u[0]` and `u[1]` decide the direction, `u[2]` the cell, `u[3]` and the stream the position in it. The flux has its
     /// colour: its mean, lost paths counted as 0, is the power of the matter, in W.
     #[must_use]
     pub fn emit(&self, medium: &Medium, u: [f32; 4], stream: &mut Stream) -> Option<Emitted> {
         let glow = self.glow(medium, u[2], Vec3::new(u[3], stream.uniform(), stream.uniform()))?;
-        let origin = medium.volume().grid().index_to_world(glow.place);
+        let origin = medium.volume().grid().index_to_world(glow.position);
         let ray = Ray::new(origin, warp::sphere([u[0], u[1]]));
         Some(Emitted { ray, flux: glow.emitted * (4.0 * PI / glow.per_volume) })
     }
 
-    /// The place `u` in a cell chosen by power, if it glows.
+    /// The position `u` in a cell chosen by power, if it glows.
     fn glow(&self, medium: &Medium, choice: f32, u: Vec3) -> Option<Glow> {
         let Choice { index: i, probability: chance, .. } = self.cells.sample(choice);
         let b = &self.glowing.bounds[i];
-        let place = b.min + b.size() * u;
-        if !medium.contains(place) {
+        let position = b.min + b.size() * u;
+        if !medium.contains(position) {
             return None;
         }
-        let optics = medium.optics(place);
+        let optics = medium.optics(position);
         let sigma_t = medium.density() * optics.opacity;
         let emitted = optics.emitted() * sigma_t;
         let per_volume = chance / (b.size().element_product() * self.glowing.voxel_volume);
-        (!emitted.is_black()).then_some(Glow { place, sigma_t, emitted, per_volume })
+        (!emitted.is_black()).then_some(Glow { position, sigma_t, emitted, per_volume })
     }
 
-    /// The density of [`Self::sample`] for a collision found by a free flight: at an index-space place
+    /// The density of [`Self::sample`] for a collision found by a free flight: at an index-space position
     /// with extinction `sigma_t`, `distance` world units away.
     #[must_use]
-    pub fn pdf(&self, place: Vec3, sigma_t: f32, distance: f32) -> f32 {
+    pub fn pdf(&self, position: Vec3, sigma_t: f32, distance: f32) -> f32 {
         let glowing = &*self.glowing;
-        let number = glowing.places.cell_at(place);
+        let number = glowing.positions.cell_at(position);
         let Ok(i) = glowing.numbers.binary_search(&number) else { return 0.0 };
         let volume = glowing.bounds[i].size().element_product() * glowing.voxel_volume;
         self.cells.probability(i) / volume * distance * distance / sigma_t

@@ -92,7 +92,7 @@ impl Light {
         }
     }
 
-    /// The light's place on a ray, if the ray passes its shining side.
+    /// The light's position on a ray, if the ray passes its shining side.
     #[inline]
     #[must_use]
     pub fn passed(&self, ray: &Ray) -> Option<Passed> {
@@ -132,7 +132,7 @@ impl Light {
 }
 
 /// Luminance of a radiance seen under the area of a small source from a target, as an irradiance.
-fn strength_of_area(radiance: Rgb, area: f32, place: Vec3, target: &Target) -> f64 {
-    let distance = place.distance(target.center).max(target.radius);
+fn strength_of_area(radiance: Rgb, area: f32, position: Vec3, target: &Target) -> f64 {
+    let distance = position.distance(target.center).max(target.radius);
     f64::from(radiance.luminance()) * f64::from(area) / f64::from(distance * distance)
 }

@@ -99,11 +99,11 @@ impl LightSet {
     /// Weight of finding glowing matter by a free flight rather than by [`Self::sample`].
     #[inline]
     #[must_use]
-    pub fn flight_weight(&self, place: Vec3, sigma_t: f32, distance: f32, pdf: f32) -> f32 {
+    pub fn flight_weight(&self, position: Vec3, sigma_t: f32, distance: f32, pdf: f32) -> f32 {
         let by_sampling = self
             .emission
             .as_ref()
-            .map_or(0.0, |e| e.pdf(place, sigma_t, distance) * self.chance(self.lights.len()));
+            .map_or(0.0, |e| e.pdf(position, sigma_t, distance) * self.chance(self.lights.len()));
         pdf / (pdf + by_sampling)
     }
 

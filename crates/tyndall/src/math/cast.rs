@@ -1,4 +1,4 @@
-//! The number conversions that may lose bits, in one place, each saying what it does with them.
+//! The number conversions that may lose bits, in one file, each saying what it does with them.
 
 /// Rounds down; saturates at the ends of `i32`; NaN becomes 0.
 #[inline]

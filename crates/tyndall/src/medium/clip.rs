@@ -58,7 +58,7 @@ impl Clip {
         Self { half_spaces }
     }
 
-    /// Whether a place of index space per lane is left.
+    /// Whether a position of index space per lane is left.
     #[inline(always)]
     pub(super) fn keeps_lanes<S: Lanes>(
         &self,

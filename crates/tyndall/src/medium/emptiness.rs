@@ -16,7 +16,7 @@ pub(super) fn extents(dims: [usize; 3], opacities: &[[f32; 2]]) -> Vec<u8> {
         distance = (0..found.len())
             .into_par_iter()
             .with_min_len(LEAST)
-            .map(|i| along(found, Line { i, place: i / stride % cells, cells, stride }))
+            .map(|i| along(found, Line { i, position: i / stride % cells, cells, stride }))
             .collect();
         stride *= cells;
     }
@@ -30,7 +30,7 @@ const LEAST: usize = 2048;
 #[derive(Clone, Copy)]
 struct Line {
     i: usize,
-    place: usize,
+    position: usize,
     /// Cells along the axis.
     cells: usize,
     /// From a cell to the next.
@@ -39,14 +39,14 @@ struct Line {
 
 /// The least, over the cells of a line, of the larger of distance along it and distance found so far.
 fn along(found: &[u8], line: Line) -> u8 {
-    let Line { i, place, cells, stride } = line;
+    let Line { i, position, cells, stride } = line;
     let mut nearest = found[i];
     for away in 1..usize::from(u8::MAX) {
-        if away >= usize::from(nearest) || (away > place && place + away >= cells) {
+        if away >= usize::from(nearest) || (away > position && position + away >= cells) {
             break;
         }
-        let before = (away <= place).then(|| found[i - away * stride]);
-        let after = (place + away < cells).then(|| found[i + away * stride]);
+        let before = (away <= position).then(|| found[i - away * stride]);
+        let after = (position + away < cells).then(|| found[i + away * stride]);
         for there in before.into_iter().chain(after) {
             nearest = nearest.min(there.max(u8::try_from(away).unwrap_or(u8::MAX)));
         }
@@ -61,9 +61,9 @@ mod tests {
 
     /// By looking at every cell.
     fn by_definition(dims: [usize; 3], opacities: &[[f32; 2]], i: usize) -> u8 {
-        let place = |i: usize| [i % dims[0], i / dims[0] % dims[1], i / (dims[0] * dims[1])];
-        let here = place(i);
-        let apart = |j: usize| (0..3).map(|a| place(j)[a].abs_diff(here[a])).max().unwrap();
+        let coordinates = |i: usize| [i % dims[0], i / dims[0] % dims[1], i / (dims[0] * dims[1])];
+        let here = coordinates(i);
+        let apart = |j: usize| (0..3).map(|a| coordinates(j)[a].abs_diff(here[a])).max().unwrap();
         let full = (0..opacities.len()).filter(|&j| opacities[j][1] > 0.0);
         full.map(apart).min().map_or(u8::MAX, |d| u8::try_from(d).unwrap())
     }

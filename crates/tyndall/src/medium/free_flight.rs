@@ -1,4 +1,4 @@
-//! Free flight and transmittance through matter that varies from place to place.
+//! Free flight and transmittance through inhomogeneous matter.
 //!
 //! Both walk the cells of the [`MajorantGrid`](super::MajorantGrid) and know of each the smallest and
 //! the largest extinction. Where these agree the cell is homogeneous and nothing is looked up. A step too
@@ -22,7 +22,7 @@ pub struct Collision {
     /// World distance inside the medium, along the track.
     pub t: f32,
     /// Where, in index space.
-    pub place: Vec3,
+    pub position: Vec3,
     /// The data value there.
     pub value: f32,
 }
@@ -102,12 +102,12 @@ impl Medium {
             // False at once in an empty cell, where the step is infinite or 0/0.
             while t + depth / majorant < cell.end {
                 t = (t + depth / majorant).max(t.next_up());
-                let place = track.at(t);
+                let position = track.at(t);
                 let level = stream.uniform() * cell.most;
-                let value = self.volume.value(place);
+                let value = self.volume.value(position);
                 notes.value(value);
                 if level < self.transfer.opacity(value) {
-                    return Some(Collision { t, place, value });
+                    return Some(Collision { t, position, value });
                 }
                 depth = stream.exponential();
             }
@@ -241,8 +241,8 @@ impl Tentative {
         if self.count == 0 {
             return 1.0;
         }
-        let place = track.lanes(simd, S::f32s::from_slice(simd, &self.t[..S::WIDTH]));
-        let value = medium.volume.value_lanes(simd, place);
+        let position = track.lanes(simd, S::f32s::from_slice(simd, &self.t[..S::WIDTH]));
+        let value = medium.volume.value_lanes(simd, position);
         if N::LISTENS {
             for &value in &value.as_slice()[..self.count] {
                 notes.value(value);

@@ -111,7 +111,7 @@ struct Axis {
     /// Cells of the grid.
     cells: i32,
     /// The present cell.
-    place: i32,
+    position: i32,
     /// Where the track leaves it.
     next: f32,
 }
@@ -120,9 +120,9 @@ impl Axis {
     #[inline(always)]
     fn new(entry: f32, direction: f32, cells: i32) -> Self {
         let sign = i32::from(direction > 0.0) - i32::from(direction < 0.0);
-        let place = cast::floor_i32(entry).clamp(0, cells - 1);
-        let axis = Self { entry, direction, inverse: direction.recip(), sign, cells, place, next: 0.0 };
-        Self { next: axis.exit(place), ..axis }
+        let position = cast::floor_i32(entry).clamp(0, cells - 1);
+        let axis = Self { entry, direction, inverse: direction.recip(), sign, cells, position, next: 0.0 };
+        Self { next: axis.exit(position), ..axis }
     }
 
     /// Where the track leaves the cells up to `last`; the outermost reach to the track's end.
@@ -139,13 +139,13 @@ impl Axis {
     /// Where the track leaves the cells up to `ahead` on.
     #[inline(always)]
     fn exit_ahead(&self, ahead: i32) -> f32 {
-        self.exit(self.place + ahead * self.sign)
+        self.exit(self.position + ahead * self.sign)
     }
 
     #[inline(always)]
-    fn enter(&mut self, place: i32) {
-        self.place = place;
-        self.next = self.exit(place);
+    fn enter(&mut self, position: i32) {
+        self.position = position;
+        self.next = self.exit(position);
     }
 
     /// Past exactly those borders that come before another axis's at distance `leave`; of borders at one distance those of
@@ -156,31 +156,31 @@ impl Axis {
             return;
         }
         let there = self.entry + self.direction * leave;
-        let place = cast::floor_i32(there).clamp(0, self.cells - 1);
-        let inside = there - place as f32;
+        let position = cast::floor_i32(there).clamp(0, self.cells - 1);
+        let inside = there - position as f32;
         let unsure = ROUNDING * self.cells as f32;
         let is_sure = inside > unsure && inside < 1.0 - unsure;
-        self.enter(if is_sure { place } else { self.place_beside(place, leave, higher) });
+        self.enter(if is_sure { position } else { self.place_beside(position, leave, higher) });
     }
 
-    /// [`Self::leap`] to a cell about `guess`: beside a border, a place is rounded otherwise than the distance to it, which
+    /// [`Self::leap`] to a cell about `guess`: beside a border, a position is rounded otherwise than the distance to it, which
     /// alone decides.
     #[cold]
     #[inline(never)]
     fn place_beside(self, guess: i32, leave: f32, higher: bool) -> i32 {
         let is_passed = |exit: f32| exit < leave || (exit == leave && higher);
-        let mut place = if (guess - self.place) * self.sign < 0 { self.place } else { guess };
-        while place != self.place && !is_passed(self.exit(place - self.sign)) {
-            place -= self.sign;
+        let mut position = if (guess - self.position) * self.sign < 0 { self.position } else { guess };
+        while position != self.position && !is_passed(self.exit(position - self.sign)) {
+            position -= self.sign;
         }
-        while is_passed(self.exit(place)) {
-            place += self.sign;
+        while is_passed(self.exit(position)) {
+            position += self.sign;
         }
-        place
+        position
     }
 }
 
-/// What rounding moves a place at most, for each cell along the axis: four times what the few roundings on the way to it,
+/// What rounding moves a position at most, for each cell along the axis: four times what the few roundings on the way to it,
 /// and to the distance of a border, can come to.
 const ROUNDING: f32 = 4e-6;
 
@@ -204,7 +204,8 @@ impl<const LEAPS: bool> Iterator for CellWalk<'_, LEAPS> {
         while self.start < self.length {
             let [x, y, z] = &self.axes;
             let (nx, ny) = (x.cells as isize, y.cells as isize);
-            let cell = (x.place as isize + nx * (y.place as isize + ny * z.place as isize)).cast_unsigned();
+            let cell =
+                (x.position as isize + nx * (y.position as isize + ny * z.position as isize)).cast_unsigned();
             // Empty cells that follow on this one.
             let ahead = if LEAPS { i32::from(self.grid.empty[cell].max(1)) - 1 } else { 0 };
             let (through, leave) = if ahead == 0 {
@@ -219,7 +220,7 @@ impl<const LEAPS: bool> Iterator for CellWalk<'_, LEAPS> {
                 for axis in 0..3 {
                     let along = &mut self.axes[axis];
                     if axis == through {
-                        along.enter(along.place + along.sign * (ahead + 1));
+                        along.enter(along.position + along.sign * (ahead + 1));
                     } else if ahead > 0 {
                         along.leap(leave, axis > through);
                     }

@@ -52,7 +52,7 @@ pub(crate) struct PacketSample<S: Lanes> {
     /// Width of the step, world units.
     pub width: S::f32s,
     /// In index space.
-    pub place: [S::f32s; 3],
+    pub position: [S::f32s; 3],
     /// Data value.
     pub value: S::f32s,
     /// Optical thickness of the step; 0 in lanes that take no sample.
@@ -186,11 +186,11 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
             let k = self.k;
             let width = k.simd_lt(self.whole).select(S::f32s::splat(simd, self.width), self.rest);
             let t = k.to_float::<S::f32s>() * self.width + width * 0.5;
-            let place = at::<S>(self.origin, self.direction, t);
+            let position = at::<S>(self.origin, self.direction, t);
             let mut here = self.active;
             self.k = k + 1;
             if self.occupied == 0 {
-                let cells = self.skip.cells::<N>(place);
+                let cells = self.skip.cells::<N>(position);
                 notes.cells(simd, here & cells.empty, cells.number);
                 let leap = self.skip.leap(k, &cells);
                 here &= !cells.empty;
@@ -209,12 +209,12 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
                 self.occupied -= 1;
             }
             self.active &= self.k.simd_lt(self.count);
-            let value = self.medium.volume.value_lanes(simd, place);
+            let value = self.medium.volume.value_lanes(simd, position);
             notes.values(simd, here, value);
             let opacity = self.medium.transfer.opacity_lanes(simd, value);
             let thickness = here.select(opacity * width * self.medium.density, zero);
             if thickness.simd_gt(zero).any_true() {
-                return Some(PacketSample { t, width, place, value, thickness });
+                return Some(PacketSample { t, width, position, value, thickness });
             }
         }
         None
@@ -260,7 +260,7 @@ impl Track {
         Steps::new(self, step).midpoint(k, step)
     }
 
-    /// Index-space places at distances inside the medium.
+    /// Index-space positions at distances inside the medium.
     #[inline(always)]
     pub(super) fn lanes<S: Lanes>(&self, simd: S, t: S::f32s) -> [S::f32s; 3] {
         let (o, d) = (self.ray.origin.to_array(), self.ray.direction.to_array());
@@ -309,8 +309,8 @@ impl<'a, S: Lanes> Along<'a, S> {
         let whole = k.simd_lt(S::i32s::splat(simd, self.steps.whole));
         let width = whole.select(S::f32s::splat(simd, self.step), S::f32s::splat(simd, self.steps.rest));
         let t = k.to_float::<S::f32s>() * self.step + width * 0.5;
-        let place = self.track.lanes(simd, t);
-        let value = self.medium.volume.value_lanes(simd, place);
+        let position = self.track.lanes(simd, t);
+        let value = self.medium.volume.value_lanes(simd, position);
         let opacity = self.medium.transfer.opacity_lanes(simd, value);
         let number = S::f32s::from_fn(simd, |lane| lane as f32);
         let taken = number.simd_lt(S::f32s::splat(simd, self.count as f32));

@@ -86,7 +86,7 @@ impl Track {
         self.before + t
     }
 
-    /// Index-space place at a distance inside the medium.
+    /// Index-space position at a distance inside the medium.
     #[inline]
     #[must_use]
     pub fn at(&self, t: f32) -> Vec3 {
@@ -214,13 +214,13 @@ impl Medium {
         Track { ray, length, before: stretch.start }
     }
 
-    /// Whether matter may be at an index-space place: inside the box and not cut away.
+    /// Whether matter may be at an index-space position: inside the box and not cut away.
     #[must_use]
     pub fn contains(&self, p: Vec3) -> bool {
         self.volume.grid().index_bounds().contains(p) && self.clip.keeps(p)
     }
 
-    /// [`Self::contains`] of a place per lane.
+    /// [`Self::contains`] of a position per lane.
     #[inline(always)]
     pub(crate) fn contains_lanes<S: Lanes>(&self, simd: S, [x, y, z]: [S::f32s; 3]) -> S::mask32s {
         let box_ = self.volume.grid().index_bounds();
@@ -231,21 +231,21 @@ impl Medium {
         self.clip.keeps_lanes(simd, [x, y, z], inside)
     }
 
-    /// Extinction per world unit at an index-space place.
+    /// Extinction per world unit at an index-space position.
     #[inline]
     #[must_use]
     pub fn sigma_t(&self, p: Vec3) -> f32 {
         self.density * self.transfer.opacity(self.volume.value(p))
     }
 
-    /// All optics at an index-space place.
+    /// All optics at an index-space position.
     #[inline]
     #[must_use]
     pub fn optics(&self, p: Vec3) -> Optics {
         self.transfer.optics(self.volume.value(p))
     }
 
-    /// The scattering function at an index-space place; the gradient is read only where it matters.
+    /// The scattering function at an index-space position; the gradient is read only where it matters.
     #[inline]
     #[must_use]
     pub fn event(&self, p: Vec3, optics: &Optics) -> Event {

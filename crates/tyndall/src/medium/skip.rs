@@ -22,7 +22,7 @@ pub(super) struct Skip<'a, S: Lanes> {
 
 /// The cells that the lanes are in.
 pub(super) struct LaneCells<S: Lanes> {
-    place: [S::i32s; 3],
+    position: [S::i32s; 3],
     /// Whether there is no matter.
     pub empty: S::mask32s,
     /// Cells to where that ends; 0 where there is matter.
@@ -58,13 +58,14 @@ impl<'a, S: Lanes> Skip<'a, S> {
     }
 
     #[inline(always)]
-    pub fn cells<N: MarchNotes<S>>(&self, place: [S::f32s; 3]) -> LaneCells<S> {
-        let place = [self.cell(place[0], 0), self.cell(place[1], 1), self.cell(place[2], 2)];
-        let number: S::u32s = (place[0] + (place[1] + place[2] * self.dims[1]) * self.dims[0]).bitcast();
+    pub fn cells<N: MarchNotes<S>>(&self, position: [S::f32s; 3]) -> LaneCells<S> {
+        let position = [self.cell(position[0], 0), self.cell(position[1], 1), self.cell(position[2], 2)];
+        let number: S::u32s =
+            (position[0] + (position[1] + position[2] * self.dims[1]) * self.dims[0]).bitcast();
         let extent: S::i32s = (self.simd.words(self.empty, number) & 0xff).bitcast();
         let empty = extent.simd_gt(S::i32s::splat(self.simd, 0));
         let extent = if N::EACH_CELL { extent.min(S::i32s::splat(self.simd, 1)) } else { extent };
-        LaneCells { place, empty, extent, number }
+        LaneCells { position, empty, extent, number }
     }
 
     #[inline(always)]
@@ -89,7 +90,7 @@ impl<'a, S: Lanes> Skip<'a, S> {
     /// Where the tracks leave what is alike along an axis.
     #[inline(always)]
     fn leave(&self, a: usize, cells: &LaneCells<S>, extent: S::i32s) -> S::f32s {
-        let border = cells.place[a] + self.forward[a].select(extent, -(extent - 1));
+        let border = cells.position[a] + self.forward[a].select(extent, -(extent - 1));
         (border.to_float::<S::f32s>() * self.edge - self.origin[a]) * self.inverse[a] + self.never[a]
     }
 }

@@ -95,7 +95,7 @@ impl Session {
         self.engine = threads.install(|| method_of(&scene.render.method).start(scene, resources));
     }
 
-    /// Goes on with an edited scene; gives what the edit changed. This is the only place where light is discarded, and the
+    /// Goes on with an edited scene; gives what the edit changed. This is the only function that discards light, and the
     /// difference alone decides what: after it the session will come to the picture that a new one would.
     pub fn set_scene(&mut self, scene: Scene) -> Difference {
         let difference = Difference::between(&self.scene, &scene);

@@ -1,6 +1,6 @@
-//! Reading from many places at once: the one thing here that the compiler cannot check.
+//! Reading from many addresses at once: the one thing here that the compiler cannot check.
 //!
-//! Every public function clamps its places to the slice, so that none can be used wrongly.
+//! Every public function clamps its addresses to the slice, so that none can be used wrongly.
 
 use crate::math::cast;
 use fearless_simd::prelude::*;
@@ -10,10 +10,10 @@ use fearless_simd::{Fallback, Simd};
 pub(crate) trait Lanes:
     Simd<f32s: SimdFloat<Self, Bits = <Self as Simd>::u32s>, i32s: Bytes<Bytes = Self::u8s>>
 {
-    /// Four bytes from each place `base + SCALE * index`, as a little-endian word.
+    /// Four bytes from each address `base + SCALE * index`, as a little-endian word.
     ///
     /// # Safety
-    /// `SCALE` is 1, 2, 4 or 8, every index is below 2^31, and from every place four bytes can be read.
+    /// `SCALE` is 1, 2, 4 or 8, every index is below 2^31, and from every address four bytes can be read.
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s;
 
     /// Lanes of a vector.
@@ -73,7 +73,7 @@ impl Lanes for fearless_simd::Neon {
 impl Lanes for fearless_simd::Avx2 {
     #[inline(always)]
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
-        // SAFETY: the token proves the instructions; the places are what the caller promises.
+        // SAFETY: the token proves the instructions; the addresses are what the caller promises.
         let words = unsafe { std::arch::x86_64::_mm256_i32gather_epi32::<SCALE>(base.cast(), index.into()) };
         words.simd_into(self)
     }
@@ -83,7 +83,7 @@ impl Lanes for fearless_simd::Avx2 {
 impl Lanes for fearless_simd::Avx512 {
     #[inline(always)]
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
-        // SAFETY: the token proves the instructions; the places are what the caller promises.
+        // SAFETY: the token proves the instructions; the addresses are what the caller promises.
         let words = unsafe { std::arch::x86_64::_mm512_i32gather_epi32::<SCALE>(index.into(), base.cast()) };
         words.simd_into(self)
     }

@@ -1,7 +1,7 @@
 //! Vector instructions, chosen when the program runs.
 //!
 //! A kernel is written once, over the lanes of `fearless_simd`, and compiled for every [`Level`]; what that library lacks,
-//! reading from many places at once, is in `gather`. Fused multiply-add rounds once where the scalar level rounds twice, so
+//! reading from many addresses at once, is in `gather`. Fused multiply-add rounds once where the scalar level rounds twice, so
 //! pictures of two levels may differ in their last bits; those of one level never do.
 
 #[expect(unsafe_code, reason = "gathers read through pointers; each says why that is sound")]

@@ -56,10 +56,10 @@ impl GlowTable {
     /// What matter of a value emits; `None` where the function is to be asked.
     #[inline]
     pub(super) fn emitted(&self, value: f32) -> Option<Rgb> {
-        let place = self.bins.place(value);
-        let bin = cast::index(place);
+        let position = self.bins.position(value);
+        let bin = cast::index(position);
         let [r, g, b, dr, dg, db] = self.rows[bin];
-        let along = place - bin as f32;
+        let along = position - bin as f32;
         (!r.is_nan()).then(|| Rgb::new(r + dr * along, g + dg * along, b + db * along))
     }
 }
@@ -80,7 +80,7 @@ mod tests {
             },
         };
         let smooth = vec![point(0.0, 0.0, 0.0), point(1024.0, 1.0, 5.0)];
-        // Jumps in the middle and at the border of a bin, a bend too strong for a line, and a spike beside the places
+        // Jumps in the middle and at the border of a bin, a bend too strong for a line, and a spike beside the values
         // where a line is tried.
         let rough = vec![
             point(0.0, 0.9, 0.1),
@@ -101,7 +101,7 @@ mod tests {
             for i in 0..21_000_u16 {
                 let value = f32::from(i) * 0.05 - 10.0;
                 let (found, exact) = (function.emitted(value).r, function.optics(value).emitted().r);
-                // A bend and the rounding of a place, 2^-14 of a bin, over which emission may rise by a third.
+                // A bend and the rounding of a position, 2^-14 of a bin, over which emission may rise by a third.
                 assert!((found - exact).abs() < 1.5e-4 * 5.0, "{found}, exactly {exact} at {value}");
                 from_table += usize::from(function.glow.as_ref().unwrap().emitted(value).is_some());
             }

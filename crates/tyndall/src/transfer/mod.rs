@@ -171,7 +171,7 @@ impl TransferFunction {
         self.opacities.bins()
     }
 
-    /// The segment that holds `value`: its two points and the place between them.
+    /// The segment that holds `value`: its two points and the position between them.
     #[inline]
     fn locate(&self, value: f32) -> (&Point, &Point, f32) {
         if value < self.points[0].value {

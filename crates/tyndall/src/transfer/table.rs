@@ -9,7 +9,7 @@ use crate::simd::Lanes;
 use crate::volume::ValueBins;
 use fearless_simd::prelude::*;
 
-/// Opacity per bin above which the rounding of a place in the bin would show, being 2^-14 of a bin at most.
+/// Opacity per bin above which the rounding of a position in the bin would show, being 2^-14 of a bin at most.
 const STEEPEST: f64 = 8.0;
 
 /// See the module.
@@ -27,14 +27,14 @@ impl OpacityTable {
     /// The table of points in ascending order, at least one.
     pub(super) fn new(points: &[Point], bins: ValueBins) -> Self {
         let mut table = Self { bins, splits: Vec::new(), lines: Vec::new(), any_rough: false };
-        // Of points that fall on one place the last holds from there.
+        // Of points at one position the last holds from there.
         let knots: Vec<[f64; 2]> =
-            points.iter().map(|p| [bins.place_beyond(p.value), f64::from(p.optics.opacity)]).collect();
-        // The line after a knot, told from a place on.
-        let line = |after: usize, place: f64| -> [f64; 2] {
+            points.iter().map(|p| [bins.position_beyond(p.value), f64::from(p.optics.opacity)]).collect();
+        // The line after a knot, told from a position on.
+        let line = |after: usize, position: f64| -> [f64; 2] {
             let ([x, o], next) = (knots[after], knots.get(after + 1));
             let slope = next.filter(|n| n[0] > x).map_or(0.0, |n| (n[1] - o) / (n[0] - x));
-            [o + slope * (place - x), slope]
+            [o + slope * (position - x), slope]
         };
         for bin in 0..ValueBins::COUNT {
             let lower = bin as f64;
@@ -45,10 +45,10 @@ impl OpacityTable {
             // Points on a level say nothing, and are not to be told from none.
             let level =
                 below[1] == 0.0 && after == below && knots[start..end].iter().all(|k| k[1] == below[0]);
-            let places = if level { &[] } else { &knots[start..end] };
-            let split = places.first().map_or(2.0, |k| k[0] - lower);
-            let above = if places.is_empty() { below } else { line(end - 1, lower + split) };
-            let one_place = places.iter().all(|k| k[0] == places[0][0]);
+            let positions = if level { &[] } else { &knots[start..end] };
+            let split = positions.first().map_or(2.0, |k| k[0] - lower);
+            let above = if positions.is_empty() { below } else { line(end - 1, lower + split) };
+            let one_place = positions.iter().all(|k| k[0] == positions[0][0]);
             let steep = [below, above].iter().any(|l| l[1].abs() > STEEPEST);
             // Whatever lies beyond the outer ends is looked up at them.
             let beyond = match bin {
@@ -84,16 +84,16 @@ impl OpacityTable {
 
     /// Whether the table cannot tell the first value from the second, nor what lies between them.
     pub(super) fn confuses(&self, a: f32, b: f32) -> bool {
-        let place = self.bins.place(a);
-        place == self.bins.place(b) && !self.splits[cast::index(place)].is_nan()
+        let position = self.bins.position(a);
+        position == self.bins.position(b) && !self.splits[cast::index(position)].is_nan()
     }
 
     /// Opacity at a value; `None` in a rough bin.
     #[inline]
     pub(super) fn opacity(&self, value: f32) -> Option<f32> {
-        let place = self.bins.place(value);
-        let bin = cast::index(place);
-        let within = place - bin as f32;
+        let position = self.bins.position(value);
+        let bin = cast::index(position);
+        let within = position - bin as f32;
         let split = self.splits[bin];
         if split.is_nan() {
             return None;
@@ -112,10 +112,10 @@ impl OpacityTable {
     ) -> S::f32s {
         let top = S::f32s::splat(simd, (ValueBins::COUNT - 1) as f32);
         let [half_first, per_half] = self.bins.numbers();
-        // Without fused operations, so that a value falls on the same side of a jump as in `place`.
-        let place = ((values * 0.5 - half_first) * per_half + 1.0).max(0.0).min(top);
-        let bin: S::i32s = place.to_int();
-        let within = place - bin.to_float::<S::f32s>();
+        // Without fused operations, so that a value falls on the same side of a jump as in `position`.
+        let position = ((values * 0.5 - half_first) * per_half + 1.0).max(0.0).min(top);
+        let bin: S::i32s = position.to_int();
+        let within = position - bin.to_float::<S::f32s>();
         let bin: S::u32s = bin.bitcast();
         let split = simd.numbers(&self.splits, bin);
         let above = within.simd_ge(split);

@@ -1,5 +1,5 @@
 //! The samples in bricks: small blocks, each with a copy of its neighbours' first samples, so that a trilinear
-//! look-up reads one block and places near each other share cache lines whatever the direction.
+//! look-up reads one block and positions near each other share cache lines whatever the direction.
 
 use super::voxels::with_voxels;
 use super::{Interpolation, Voxel, Voxels};
@@ -100,7 +100,7 @@ impl Bricks {
     }
 
     /// Where a sample lies.
-    fn place(&self, sample: [usize; 3]) -> usize {
+    fn offset(&self, sample: [usize; 3]) -> usize {
         let [x, y, z] = self.edge;
         let brick: [usize; 3] = std::array::from_fn(|a| (sample[a] / BRICK).min(self.counts[a] - 1));
         let local: [usize; 3] = std::array::from_fn(|a| sample[a] - brick[a] * BRICK);
@@ -117,7 +117,7 @@ impl Bricks {
         let [nx, ny, nz] = self.dims;
         let [x, y, z] = sample;
         assert!(x < nx && y < ny && z < nz, "voxel ({x}, {y}, {z}) outside {nx} x {ny} x {nz}");
-        with_voxels!(&self.samples, data => data[self.place(sample)].to_f64())
+        with_voxels!(&self.samples, data => data[self.offset(sample)].to_f64())
     }
 
     /// A copy of the samples in file order, x fastest.
@@ -127,7 +127,7 @@ impl Bricks {
         macro_rules! gather {
             ($($kind:ident)*) => {
                 match &self.samples {$(
-                    Voxels::$kind(data) => Voxels::$kind(samples.map(|s| data[self.place(s)]).collect()),
+                    Voxels::$kind(data) => Voxels::$kind(samples.map(|s| data[self.offset(s)]).collect()),
                 )*}
             };
         }
@@ -152,7 +152,7 @@ impl Bricks {
                     for y in 0..self.dims[1] {
                         for i in 0..self.counts[0] {
                             let row = own(i, 0);
-                            let first = self.place([row.start, y, z]);
+                            let first = self.offset([row.start, y, z]);
                             // The last sample of a row may be another brick's by number, but is in this one too.
                             data[first..first + row.len()].iter().for_each(|v| take(&mut sum, v.to_f64()));
                         }
@@ -167,11 +167,11 @@ impl Bricks {
     /// Smallest and largest stored sample within `first ..= last`.
     pub(super) fn extremes(&self, first: [usize; 3], last: [usize; 3]) -> [f64; 2] {
         with_voxels!(&self.samples, data => {
-            let mut range = [data[self.place(first)]; 2];
+            let mut range = [data[self.offset(first)]; 2];
             for z in first[2]..=last[2] {
                 for y in first[1]..=last[1] {
                     for x in first[0]..=last[0] {
-                        let v = data[self.place([x, y, z])];
+                        let v = data[self.offset([x, y, z])];
                         range = wider(range, v);
                     }
                 }
@@ -256,13 +256,13 @@ impl Lattice {
 
     #[inline]
     fn nearest<T: Voxel>(&self, samples: &[T], p: Vec3) -> f32 {
-        let place = |a: usize| {
+        let position = |a: usize| {
             let i = cast::truncate(p[a].max(0.0).min(self.last[a]) + 0.5);
             // The last sample of an axis may stand after the last cell of the last brick.
             let lower = i.min(self.lower[a]);
             self.along(a, lower) + usize::from(i > lower) * self.step[a]
         };
-        samples[place(0) + place(1) + place(2)].to_f32()
+        samples[position(0) + position(1) + position(2)].to_f32()
     }
 }
 
@@ -336,14 +336,14 @@ mod tests {
                     };
                     expected += sample(at) * weight(0) * weight(1) * weight(2);
                 }
-                let place = Vec3::from_array(p.map(cast::single));
-                let found = read(&bricks, place, Interpolation::Linear);
+                let position = Vec3::from_array(p.map(cast::single));
+                let found = read(&bricks, position, Interpolation::Linear);
                 assert!(
                     (f64::from(found) - expected).abs() < 0.02,
                     "{found}, expected {expected} at {p:?} of {dims:?}"
                 );
                 let nearest = sample(p.map(|x| i64::from(cast::floor_i32(cast::single(x + 0.5)))));
-                let found = read(&bricks, place, Interpolation::Nearest);
+                let found = read(&bricks, position, Interpolation::Nearest);
                 assert_eq!(f64::from(found), nearest, "nearest at {p:?} of {dims:?}");
             }
             let origin = linear.get(0);

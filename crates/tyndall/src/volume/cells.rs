@@ -34,7 +34,7 @@ impl Cells {
         let edge = if edge == 0 { n.into_iter().max().unwrap_or(1) } else { edge };
         let dims = n.map(|n| (n - 1).div_ceil(edge).max(1));
         let range = |number: usize| {
-            let first = place(number, dims).map(|i| i * edge);
+            let first = coordinates(number, dims).map(|i| i * edge);
             let last = std::array::from_fn(|a| (first[a] + edge).min(n[a] - 1));
             to_values(values, bricks.extremes(first, last))
         };
@@ -60,18 +60,18 @@ impl Cells {
         &self.ranges
     }
 
-    /// The number of the cell at an index-space place, clamped to the grid.
+    /// The number of the cell at an index-space position, clamped to the grid.
     #[must_use]
     pub fn cell_at(&self, p: Vec3) -> usize {
-        let place = p / self.edge as f32;
+        let position = p / self.edge as f32;
         let [nx, ny, nz] = self.dims;
         let pick = |x: f32, n: usize| cast::index(x).min(n - 1);
-        pick(place.x, nx) + nx * (pick(place.y, ny) + ny * pick(place.z, nz))
+        pick(position.x, nx) + nx * (pick(position.y, ny) + ny * pick(position.z, nz))
     }
 
-    /// The cells that meet the box that reaches so far from an index-space place along each axis.
+    /// The cells that meet the box that reaches so far from an index-space position along each axis.
     pub fn cells_within(&self, p: Vec3, reach: Vec3) -> impl Iterator<Item = usize> {
-        let [first, last] = [p - reach, p + reach].map(|p| place(self.cell_at(p), self.dims));
+        let [first, last] = [p - reach, p + reach].map(|p| coordinates(self.cell_at(p), self.dims));
         let [nx, ny, _] = self.dims;
         (first[2]..=last[2]).flat_map(move |z| {
             (first[1]..=last[1]).flat_map(move |y| (first[0]..=last[0]).map(move |x| x + nx * (y + ny * z)))
@@ -81,7 +81,7 @@ impl Cells {
     /// The part of index space that a cell covers in the medium's box.
     #[must_use]
     pub fn cell_bounds(&self, cell: usize, medium: &Bounds) -> Bounds {
-        let at = place(cell, self.dims);
+        let at = coordinates(cell, self.dims);
         let border = |i: usize| (i * self.edge) as f32;
         let min = |a: usize| if at[a] == 0 { medium.min[a] } else { border(at[a]) };
         let max = |a: usize| if at[a] + 1 == self.dims[a] { medium.max[a] } else { border(at[a] + 1) };
@@ -89,7 +89,7 @@ impl Cells {
     }
 }
 
-fn place(number: usize, [nx, ny, _]: [usize; 3]) -> [usize; 3] {
+fn coordinates(number: usize, [nx, ny, _]: [usize; 3]) -> [usize; 3] {
     [number % nx, number / nx % ny, number / (nx * ny)]
 }
 

@@ -145,7 +145,7 @@ impl Grid {
         self.direction
     }
 
-    /// World place of the centre of voxel (0, 0, 0).
+    /// World position of the centre of voxel (0, 0, 0).
     #[must_use]
     pub fn origin(&self) -> [f64; 3] {
         self.origin

@@ -1,4 +1,4 @@
-//! Reading the field at a place per lane.
+//! Reading the field at a position per lane.
 
 use super::bricks::{BRICK, Lattice};
 use super::{Interpolation, Volume, Voxel, Voxels};
@@ -7,24 +7,24 @@ use crate::simd::Lanes;
 use fearless_simd::prelude::*;
 
 impl Volume {
-    /// [`Volume::value`] of a place per lane, each axis in a vector of its own.
+    /// [`Volume::value`] of a position per lane, each axis in a vector of its own.
     #[inline(always)]
-    pub(crate) fn value_lanes<S: Lanes>(&self, simd: S, place: [S::f32s; 3]) -> S::f32s {
+    pub(crate) fn value_lanes<S: Lanes>(&self, simd: S, position: [S::f32s; 3]) -> S::f32s {
         let samples = self.bricks.samples();
         // Gathers take signed indices.
         if samples.len() > i32::MAX as usize {
-            let at = |lane: usize| Vec3::from_array(place.map(|axis| axis.as_slice()[lane]));
+            let at = |lane: usize| Vec3::from_array(position.map(|axis| axis.as_slice()[lane]));
             return S::f32s::from_fn(simd, |lane| self.value(at(lane)));
         }
         let stored = match samples {
-            Voxels::U8(samples) => self.stored_lanes(simd, samples, place),
-            Voxels::I8(samples) => self.stored_lanes(simd, samples, place),
-            Voxels::U16(samples) => self.stored_lanes(simd, samples, place),
-            Voxels::I16(samples) => self.stored_lanes(simd, samples, place),
-            Voxels::U32(samples) => self.stored_lanes(simd, samples, place),
-            Voxels::I32(samples) => self.stored_lanes(simd, samples, place),
-            Voxels::F32(samples) => self.stored_lanes(simd, samples, place),
-            Voxels::F64(samples) => self.stored_lanes(simd, samples, place),
+            Voxels::U8(samples) => self.stored_lanes(simd, samples, position),
+            Voxels::I8(samples) => self.stored_lanes(simd, samples, position),
+            Voxels::U16(samples) => self.stored_lanes(simd, samples, position),
+            Voxels::I16(samples) => self.stored_lanes(simd, samples, position),
+            Voxels::U32(samples) => self.stored_lanes(simd, samples, position),
+            Voxels::I32(samples) => self.stored_lanes(simd, samples, position),
+            Voxels::F32(samples) => self.stored_lanes(simd, samples, position),
+            Voxels::F64(samples) => self.stored_lanes(simd, samples, position),
         };
         stored * self.slope + self.intercept
     }
@@ -157,9 +157,9 @@ mod tests {
 
         #[inline(always)]
         fn run<S: Lanes>(self, simd: S) -> Vec<f32> {
-            let read = |places: &[[f32; 3]]| {
-                let place = [0, 1, 2].map(|a| S::f32s::from_fn(simd, |lane| places[lane][a]));
-                self.0.value_lanes(simd, place).as_slice().to_vec()
+            let read = |positions: &[[f32; 3]]| {
+                let position = [0, 1, 2].map(|a| S::f32s::from_fn(simd, |lane| positions[lane][a]));
+                self.0.value_lanes(simd, position).as_slice().to_vec()
             };
             self.1.chunks_exact(S::WIDTH).flat_map(read).collect()
         }
@@ -185,7 +185,7 @@ mod tests {
     fn every_level_reads_the_scalar_value() {
         let mut random = SplitMix::new(23);
         for dims in [[20, 11, 9], [1, 12, 3], [30, 1, 1], [2, 2, 2], [1, 1, 1]] {
-            let places: Vec<[f32; 3]> = (0..960)
+            let positions: Vec<[f32; 3]> = (0..960)
                 .map(|_| dims.map(|n| cast::single(random.uniform() * (n as f64 + 1.0)) - 1.0))
                 .collect();
             for kind in 0..8 {
@@ -196,13 +196,13 @@ mod tests {
                     let volume = volume.clone().with_interpolation(interpolation);
                     let [lo, hi] = volume.value_range();
                     for level in Level::available() {
-                        let found = level.run(Values(&volume, &places));
-                        for (place, found) in places.iter().zip(found) {
-                            let expected = volume.value(Vec3::from_array(*place));
+                        let found = level.run(Values(&volume, &positions));
+                        for (position, found) in positions.iter().zip(found) {
+                            let expected = volume.value(Vec3::from_array(*position));
                             let apart = f64::from(found - expected).abs();
                             assert!(
                                 apart <= 1e-6 * (hi - lo),
-                                "{found}, expected {expected} at {place:?} of {dims:?} {} {interpolation:?} {level:?}",
+                                "{found}, expected {expected} at {position:?} of {dims:?} {} {interpolation:?} {level:?}",
                                 volume.type_name()
                             );
                         }

@@ -250,7 +250,7 @@ impl Volume {
     /// The histogram of the robust range in 256 bins, by which transfer functions find their thresholds.
     #[must_use]
     pub fn robust_histogram(&self) -> &Histogram {
-        /// Fine enough to place a threshold, coarse enough for every bin to mean something.
+        /// Fine enough to set a threshold, coarse enough for every bin to mean something.
         const BINS: usize = 256;
         self.counts.robust.get_or_init(|| self.histogram(self.robust_range, BINS))
     }
@@ -270,8 +270,8 @@ impl Volume {
     /// # Panics
     /// If the voxel is outside the grid.
     #[must_use]
-    pub fn voxel(&self, place: [usize; 3]) -> f64 {
-        self.values.apply(self.bricks.get(place))
+    pub fn voxel(&self, position: [usize; 3]) -> f64 {
+        self.values.apply(self.bricks.get(position))
     }
 
     /// The data value at a point of index space, clamped to the edge outside.
@@ -304,8 +304,8 @@ mod tests {
         let direction = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]];
         let grid = Grid::new([6, 5, 4], [0.5, 1.0, 2.0], direction, [1.0, 2.0, 3.0], Space::Plain).unwrap();
         let slope = Vec3::new(3.0, -1.0, 0.5);
-        let place = |i: u8| Vec3::new(f32::from(i % 6), f32::from(i / 6 % 5), f32::from(i / 30));
-        let data = (0..120).map(|i| slope.dot(grid.index_to_world(place(i)))).collect();
+        let position = |i: u8| Vec3::new(f32::from(i % 6), f32::from(i / 6 % 5), f32::from(i / 30));
+        let data = (0..120).map(|i| slope.dot(grid.index_to_world(position(i)))).collect();
         let values = ValueMap { slope: 2.0, intercept: -7.0 };
         let volume = Volume::new(grid, Voxels::F32(data), values).unwrap();
         for p in [Vec3::new(2.0, 2.0, 1.0), Vec3::new(1.3, 3.4, 2.5)] {

@@ -35,14 +35,14 @@ impl ValueBins {
         self.per_half.is_normal()
     }
 
-    /// The bin of a value, plus the place in it from 0 to 1; never falls as values rise.
+    /// The bin of a value, plus the position in it from 0 to 1; never falls as values rise.
     #[inline]
     #[must_use]
-    pub fn place(self, value: f32) -> f32 {
+    pub fn position(self, value: f32) -> f32 {
         self.unbounded(value).max(0.0).min((Self::COUNT - 1) as f32)
     }
 
-    /// For lanes, which compute the same: what [`Self::place`] subtracts from half a value and then multiplies it by, before it adds 1 and clamps; each
+    /// For lanes, which compute the same: what [`Self::position`] subtracts from half a value and then multiplies it by, before it adds 1 and clamps; each
     /// operation rounds.
     #[inline]
     pub(crate) fn numbers(self) -> [f32; 2] {
@@ -53,8 +53,8 @@ impl ValueBins {
         (value * 0.5 - self.half_first) * self.per_half + 1.0
     }
 
-    /// [`Self::place`] without bounds: as that rounds it where it has none, else in double precision.
-    pub(crate) fn place_beyond(self, value: f32) -> f64 {
+    /// [`Self::position`] without bounds: as that rounds it where it has none, else in double precision.
+    pub(crate) fn position_beyond(self, value: f32) -> f64 {
         let rounded = self.unbounded(value);
         if (0.0..Self::COUNT as f32).contains(&rounded) {
             return f64::from(rounded);
@@ -62,17 +62,17 @@ impl ValueBins {
         (f64::from(value) * 0.5 - f64::from(self.half_first)) * f64::from(self.per_half) + 1.0
     }
 
-    /// The value at a place, but for rounding.
+    /// The value at a position, but for rounding.
     #[must_use]
-    pub fn value(self, place: f32) -> f32 {
-        ((place - 1.0) / self.per_half + self.half_first) * 2.0
+    pub fn value(self, position: f32) -> f32 {
+        ((position - 1.0) / self.per_half + self.half_first) * 2.0
     }
 
     /// [`Self::bin`] of a value per lane.
     #[inline(always)]
     pub(crate) fn bin_lanes<S: Lanes>(self, simd: S, values: S::f32s) -> S::i32s {
         let top = S::f32s::splat(simd, (Self::COUNT - 1) as f32);
-        // Without fused operations, as in `place`.
+        // Without fused operations, as in `position`.
         ((values * 0.5 - self.half_first) * self.per_half + 1.0).max(0.0).min(top).to_int()
     }
 
@@ -80,7 +80,7 @@ impl ValueBins {
     #[inline]
     #[must_use]
     pub fn bin(self, value: f32) -> usize {
-        cast::index(self.place(value))
+        cast::index(self.position(value))
     }
 }
 
@@ -93,8 +93,8 @@ mod tests {
         let bins = ValueBins::new([-1000.0, 3096.0]);
         assert_eq!([-1000.5, -1000.0, -996.0, 3095.9, 3096.0].map(|v| bins.bin(v)), [0, 1, 2, 1024, 1025]);
         assert_eq!([f32::MIN, f32::MAX].map(|v| bins.bin(v)), [0, ValueBins::COUNT - 1]);
-        assert!((bins.place_beyond(-9000.0) + 1999.0).abs() < 1e-9);
-        assert_eq!(bins.place_beyond(-996.5), f64::from(bins.place(-996.5)));
+        assert!((bins.position_beyond(-9000.0) + 1999.0).abs() < 1e-9);
+        assert_eq!(bins.position_beyond(-996.5), f64::from(bins.position(-996.5)));
     }
 
     #[test]

@@ -55,13 +55,13 @@ fn by_quadrature(x: f64, near: f64, far: f64) -> f64 {
     let mut sum = 0.0;
     for &(s, ws) in &gauss {
         let depth = 0.5 * s;
-        let place = [x, 0.0, -0.5 - depth];
+        let position = [x, 0.0, -0.5 - depth];
         let mut lit = 0.0;
         for &(a, wa) in &gauss {
             for &(b, wb) in &gauss {
                 for &(c, wc) in &gauss {
                     let y = [a, b, c].map(|t| half * (2.0 * t - 1.0));
-                    let to = [0, 1, 2].map(|i| y[i] - place[i]);
+                    let to = [0, 1, 2].map(|i| y[i] - position[i]);
                     let distance = to.iter().map(|d| d * d).sum::<f64>().sqrt();
                     let way = to.map(|d| d / distance);
                     // Back from y towards the slab: out of the cube, then up through the slab.

@@ -137,12 +137,12 @@ fn surfaces_inside_shine_whole() {
 /// Beside a face, an edge and a corner, close to and far: the density is one over the flux, which is constant.
 #[test]
 fn directions_from_outside_are_uniform_over_the_box() {
-    let places = [[0.5, 0.4, 1.05], [-0.3, 0.2, 1.4], [1.3, -0.2, -0.6], [0.3, 1.6, 3.0]];
+    let positions = [[0.5, 0.4, 1.05], [-0.3, 0.2, 1.4], [1.3, -0.2, -0.6], [0.3, 1.6, 3.0]];
     for (name, grid) in grids() {
         let box_ = Enclosure::new(&grid);
         let b = grid.index_bounds();
-        for place in places {
-            let from = grid.index_to_world(b.min + b.size() * Vec3::from_array(place));
+        for position in positions {
+            let from = grid.index_to_world(b.min + b.size() * Vec3::from_array(position));
             let light = point(from);
             let flux = light.emit(&box_, [0.5; 4]).unwrap().flux.g;
             let sample = |u: [f32; 2]| {
@@ -154,15 +154,15 @@ fn directions_from_outside_are_uniform_over_the_box() {
                 let ray = Ray::new(from, Vec3::from_array(w));
                 if hits(&grid, &ray) { 1.0 / f64::from(flux) } else { 0.0 }
             };
-            let test = ChiSquare { rows: 32, columns: 64, ..ChiSquare::of(3 * places.len()) };
+            let test = ChiSquare { rows: 32, columns: 64, ..ChiSquare::of(3 * positions.len()) };
             let fit = test.directions(sample, pdf);
-            assert!(fit.passes(), "{name}, from {place:?}: {fit}");
+            assert!(fit.passes(), "{name}, from {position:?}: {fit}");
         }
     }
 }
 
 /// On faces, edges and corners, in their planes and lines, a hair away from them, and far off: paths start at finite
-/// places with finite flux, and those from outside meet the box.
+/// positions with finite flux, and those from outside meet the box.
 #[test]
 fn no_place_of_a_light_is_too_hard() {
     let mut started = 0;
@@ -170,20 +170,20 @@ fn no_place_of_a_light_is_too_hard() {
         let box_ = Enclosure::new(&grid);
         let b = grid.index_bounds();
         let along = [-1e30, -1e7, -3.0, -1e-6, 0.0, 1e-6, 0.5, 1.0, 1.000_001, 2.0, 1e4, 1e12];
-        for place in (0..12_usize.pow(3)).map(|i| [along[i % 12], along[i / 12 % 12], along[i / 144]]) {
-            let place = Vec3::from_array(place);
-            let from = grid.index_to_world(b.min + b.size() * place);
-            let back = (0.4 - place).clamp(Vec3::splat(-1e9), Vec3::splat(1e9));
+        for position in (0..12_usize.pow(3)).map(|i| [along[i % 12], along[i / 12 % 12], along[i / 144]]) {
+            let position = Vec3::from_array(position);
+            let from = grid.index_to_world(b.min + b.size() * position);
+            let back = (0.4 - position).clamp(Vec3::splat(-1e9), Vec3::splat(1e9));
             let sphere = SphereLight { middle: from, radius: 0.1, radiance: Rgb::WHITE };
             let rect = Rect::new(from, back, Vec3::X, [0.1, 0.2], Rgb::WHITE);
             for (kind, light) in [point(from), Light::Rect(rect), Light::Sphere(sphere)].iter().enumerate() {
                 for u in [[0.0; 4], [0.3, 0.6, 0.5, 0.5], [1.0_f32.next_down(); 4]] {
                     let Some(emitted) = light.emit(&box_, u) else { continue };
-                    let what = format!("{name}, {place}, {kind}: {emitted:?}");
+                    let what = format!("{name}, {position}, {kind}: {emitted:?}");
                     assert!(emitted.ray.origin.is_finite() && emitted.flux.is_finite(), "{what}");
                     assert!((emitted.ray.direction.length() - 1.0).abs() < 1e-5, "{what}");
-                    let outside =
-                        place.cmplt(Vec3::splat(-1e-5)).any() || place.cmpgt(Vec3::splat(1.000_01)).any();
+                    let outside = position.cmplt(Vec3::splat(-1e-5)).any()
+                        || position.cmpgt(Vec3::splat(1.000_01)).any();
                     assert!(kind != 0 || !outside || hits(&grid, &emitted.ray), "{what}");
                     started += 1;
                 }
@@ -211,11 +211,11 @@ fn no_box_is_too_flat() {
     let grid = Grid::new([1; 3], [1e-15, 1e15, 1.0], UNIT, [0.0; 3], Space::Plain).unwrap();
     let box_ = Enclosure::new(&grid);
     let along = [-1e16, -1.0, -1e-6, 0.0, 1e-10, 1.0, 1e13];
-    for place in (0..7_usize.pow(3)).map(|i| [along[i % 7], along[i / 7 % 7], along[i / 49]]) {
+    for position in (0..7_usize.pow(3)).map(|i| [along[i % 7], along[i / 7 % 7], along[i / 49]]) {
         for u in [[0.0; 4], [0.3, 0.6, 0.5, 0.5], [1.0_f32.next_down(); 4]] {
-            let Some(emitted) = point(Vec3::from_array(place)).emit(&box_, u) else { continue };
+            let Some(emitted) = point(Vec3::from_array(position)).emit(&box_, u) else { continue };
             let finite = emitted.ray.origin.is_finite() && emitted.ray.direction.is_finite();
-            assert!(finite && emitted.flux.is_finite(), "{place:?}: {emitted:?}");
+            assert!(finite && emitted.flux.is_finite(), "{position:?}: {emitted:?}");
         }
     }
 }

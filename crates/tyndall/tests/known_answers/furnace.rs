@@ -1,5 +1,5 @@
 //! White furnace: with albedo 1 in a uniform environment every pixel is the environment, whatever the
-//! shape, the density, the phase function and the place of the camera.
+//! shape, the density, the phase function and the position of the camera.
 
 use crate::scenes::{Setup, henyey_greenstein, mean, radiance, volume};
 use tyndall::light::{Environment, Light};
@@ -34,7 +34,7 @@ fn random_setup(seed: u32, surface: f32) -> Setup {
     Setup { lights: sky(), ..Setup::new(volume(n, [2.0; 3], value), points, density) }
 }
 
-/// From a random place, sometimes inside, in a random direction towards the middle.
+/// From a random position, sometimes inside, in a random direction towards the middle.
 fn any_ray(s: &mut Stream) -> Ray {
     let mut cube = || Vec3::new(s.uniform() - 0.5, s.uniform() - 0.5, s.uniform() - 0.5);
     let (from, to) = (cube() * 5.0, cube());

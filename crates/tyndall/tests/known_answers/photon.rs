@@ -54,7 +54,7 @@ fn cloud(p: [f32; 3]) -> f32 {
     (-2.5 * (Vec3::from_array(p) - Vec3::new(0.1, -0.05, 0.15)).length_squared()).exp()
 }
 
-/// The value of a voxel, one of 32 along each axis, by its place in [-1, 1]^3.
+/// The value of a voxel, one of 32 along each axis, by its position in [-1, 1]^3.
 fn of_32(value: impl Fn([f32; 3]) -> f32) -> impl Fn([usize; 3]) -> f32 {
     move |p| value(p.map(|i| (i as f32 + 0.5) / 16.0 - 1.0))
 }
@@ -76,7 +76,7 @@ fn sunny(albedo: f32) -> Setup {
     Setup { lights: vec![sun()], max_scatter: 20, ..Setup::new(volume, ramp(optics), 2.0) }
 }
 
-/// Seen by a parallel view towards a place.
+/// Seen by a parallel view towards a position.
 fn seen(setup: Setup, from: Vec3, to: Vec3, height: f32) -> Scene {
     let mut scene = setup.scene();
     scene.camera = Camera::new(from, to, Vec3::Z, Lens::Orthographic { height });

@@ -16,7 +16,7 @@ use std::ffi::OsString;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use tyndall::message::place;
+use tyndall::message::path_name;
 use tyndall::volume::ValueMap;
 
 /// Reads a `.nii`, `.hdr` or `.img` file, or one of these compressed with gzip.
@@ -133,6 +133,6 @@ fn beside(path: &Path, extension: &str) -> Result<PathBuf, ReadError> {
             return Ok(candidate);
         }
     }
-    let expected = format!("{}.{extension} or .{extension}.gz beside it", place(&stem));
+    let expected = format!("{}.{extension} or .{extension}.gz beside it", path_name(&stem));
     Err(ReadError::missing(path, "the other file of the pair", &expected))
 }

@@ -6,7 +6,7 @@ use crate::volume::Grid;
 /// Cells at most: where the radius would ask for more, they are wider than it.
 const MOST_CELLS: f32 = (1 << 24) as f32;
 
-/// A cell is wider than the radius by more than single precision errs in a place, so that a place put into the cell beside
+/// A cell is wider than the radius by more than single precision errs in a position, so that a position put into the cell beside
 /// its own still has all that it gathers in the neighbourhood. In a volume of many radii that is a share of its extent.
 const MARGIN: f32 = 1e-4;
 const MARGIN_OF_EXTENT: f32 = 1.0 / (1 << 22) as f32;
@@ -62,7 +62,7 @@ impl CellGrid {
         &self.to_index
     }
 
-    /// How far a cell and its neighbours reach from any place in it, along each axis of index space.
+    /// How far a cell and its neighbours reach from any position in it, along each axis of index space.
     pub fn index_reach(&self) -> Vec3 {
         self.index_reach
     }
@@ -74,11 +74,11 @@ impl CellGrid {
 
     /// Index space to metric space.
     #[inline(always)]
-    pub fn to_metric(self, place: Vec3) -> Vec3 {
-        self.linear * (place - self.middle)
+    pub fn to_metric(self, position: Vec3) -> Vec3 {
+        self.linear * (position - self.middle)
     }
 
-    /// The cell of a metric place, clamped to the grid.
+    /// The cell of a metric position, clamped to the grid.
     #[inline]
     pub fn cell(&self, p: Vec3) -> [usize; 3] {
         let along = |axis: usize| self.along(p[axis], axis);
@@ -105,7 +105,7 @@ impl CellGrid {
         })
     }
 
-    /// The cells that may hold something within reach of a metric place: first and last along each axis.
+    /// The cells that may hold something within reach of a metric position: first and last along each axis.
     #[inline(always)]
     pub fn around(&self, p: Vec3, reach: Vec3) -> [[usize; 2]; 3] {
         let (lo, hi) = (p - reach, p + reach);
@@ -116,7 +116,7 @@ impl CellGrid {
         ]
     }
 
-    /// Which of 64 bits along each axis a metric place has.
+    /// Which of 64 bits along each axis a metric position has.
     pub fn axis_bins(&self, p: Vec3) -> [u32; 3] {
         [0, 1, 2].map(|axis| self.axis_bin(p[axis], axis))
     }
@@ -126,7 +126,7 @@ impl CellGrid {
         cast::fit_u32(cast::index(share * AXIS_BITS).min(63))
     }
 
-    /// Bits along each axis that lie in the cell of a metric place or its neighbours.
+    /// Bits along each axis that lie in the cell of a metric position or its neighbours.
     pub fn axis_reach(&self, p: Vec3) -> [u64; 3] {
         let r = 2.0 * self.edge * (1.0 + self.margin);
         [0, 1, 2].map(|axis| {

@@ -38,7 +38,7 @@ impl PackedHistories {
     pub fn set(&mut self, i: usize, history: Historygram) {
         let bits = history.bits();
         let words = &mut self.words[i * self.width..(i + 1) * self.width];
-        words.iter_mut().enumerate().for_each(|(word, place)| *place = part(bits, word));
+        words.iter_mut().enumerate().for_each(|(word, position)| *position = part(bits, word));
     }
 
     #[inline]

@@ -40,8 +40,8 @@ impl Touched {
         let glowing = bins_where(&|transfer, bin| transfer.emission_bound(around(transfer, bin)) > 0.0);
         let emission = groups.query(&transfer.emission);
         // Cells are weighed by all that is in them, also by what does not glow.
-        let places = [old, new].map(|scene| scene.lights.emission());
-        let moved = matches!(places, [Some(old), Some(new)] if !old.same_places(new));
+        let positions = [old, new].map(|scene| scene.lights.emission());
+        let moved = matches!(positions, [Some(old), Some(new)] if !old.same_cells(new));
         Self {
             paths: Past { flight, scatter },
             view: flight | scatter | (emission & matter),

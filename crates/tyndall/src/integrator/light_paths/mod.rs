@@ -211,7 +211,7 @@ impl Tracing<'_> {
     }
 }
 
-/// The place of four numbers in [0, 1) on a curve that fills their space: where numbers are alike, so are places.
+/// The position of four numbers in [0, 1) on a curve that fills their space: similar numbers have positions near each other.
 fn morton(u: [f32; 4]) -> u32 {
     let steps = u.map(|u| cast::low_u32(cast::index(u * 256.0) as u64));
     let bit = |i: u32| {

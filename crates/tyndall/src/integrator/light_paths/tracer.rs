@@ -229,14 +229,14 @@ impl Tracer<'_> {
         *past = writer.past;
         let collision = collision?;
         Some(V::new(&Arrival {
-            position: collision.place,
+            position: collision.position,
             direction: flight.ray.direction,
             flux: flight.flux / chance(flight.bounce),
         }))
     }
 
     /// Scatters light on, or takes it away \[Jonsson12, eq. 7\]: it survives with the chance that its brightest channel
-    /// does, which depends on the place alone and not on what the path carries, so that no channel's light ends another's.
+    /// does, which depends on the position alone and not on what the path carries, so that no channel's light ends another's.
     #[inline(always)]
     fn scatter<V: Vertex>(
         &self,

@@ -171,14 +171,14 @@ impl CameraPath {
         if !emitted.is_black() {
             let sigma_t = medium.density() * optics.opacity;
             let weight =
-                pdf.map_or(1.0, |pdf| scene.lights.flight_weight(collision.place, sigma_t, reach, pdf));
+                pdf.map_or(1.0, |pdf| scene.lights.flight_weight(collision.position, sigma_t, reach, pdf));
             seen.radiance += *throughput * emitted * weight;
         }
         if *order == scene.render.max_scatter {
             return ControlFlow::Break(());
         }
-        let event = medium.event(collision.place, &optics);
-        let here = medium.volume().grid().index_to_world(collision.place);
+        let event = medium.event(collision.position, &optics);
+        let here = medium.volume().grid().index_to_world(collision.position);
         let point = ScatteringPoint { event: &event, position: here, w_out: -ray.direction };
         seen.radiance += *throughput * point.direct(simd, scene, &u, &mut numbers.stream, notes);
         let Some(scattered) = event.sample(-ray.direction, u.scatter) else { return ControlFlow::Break(()) };

@@ -1,4 +1,4 @@
-//! What photons tell about the light at a place \[Jonsson12, eq. 8\].
+//! What photons tell about the light at a position \[Jonsson12, eq. 8\].
 
 use super::kernel::{Ball, GatherRegion, Slice};
 use super::map::PhotonMap;
@@ -16,21 +16,21 @@ use std::ops::Range;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gathering {
     /// Index space.
-    pub place: Vec3,
+    pub position: Vec3,
     /// Opacity there; positive but for rounding.
     pub opacity: f32,
     pub event: Event,
     /// Towards the viewer.
     pub w_out: Vec3,
-    /// World units of the viewer's ray that the place stands for.
+    /// World units of the viewer's ray that the position stands for.
     pub width: f32,
     /// Of the ray in its packet.
     pub lane: usize,
 }
 
 impl PhotonMap {
-    /// Light from everywhere that a place scatters to a viewer, per unit extinction. `notes` hears of the values that are
-    /// read about the place.
+    /// Light from everywhere that a position scatters to a viewer, per unit extinction. `notes` hears of the values that are
+    /// read about the position.
     #[inline(always)]
     pub fn scattered<S: Lanes>(
         &self,
@@ -40,7 +40,7 @@ impl PhotonMap {
         distances: &mut Vec<f32>,
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
-        let (points, number) = (&self.points, number_of(at.place));
+        let (points, number) = (&self.points, number_of(at.position));
         match self.estimate {
             Estimator::Point => self.within(simd, medium, at, Ball::new(1.0, number, points), notes),
             Estimator::Nearest(count) => {
@@ -64,7 +64,7 @@ impl PhotonMap {
         mut kernel: R,
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
-        let (q, here) = (self.grid.to_metric(at.place), (at.place, at.opacity, at.lane));
+        let (q, here) = (self.grid.to_metric(at.position), (at.position, at.opacity, at.lane));
         let index = self.grid.index_per_metric();
         let mut matter = Matter::about(simd, medium, here, index, &kernel, notes);
         // World units over the mean free path.
@@ -103,7 +103,7 @@ impl PhotonMap {
         if light.to_array().iter().all(|x| x.is_finite()) { light } else { Rgb::BLACK }
     }
 
-    /// Photons from the `i`-th on, relative to a metric place.
+    /// Photons from the `i`-th on, relative to a metric position.
     #[inline(always)]
     fn apart<S: Lanes>(&self, simd: S, q: Vec3, i: usize) -> [S::f32s; 3] {
         [load(simd, &self.x, i) - q.x, load(simd, &self.y, i) - q.y, load(simd, &self.z, i) - q.z]
@@ -113,7 +113,7 @@ impl PhotonMap {
     /// leaves it without bias where photons lie evenly.
     #[inline(always)]
     fn radius_of<S: Lanes>(&self, simd: S, at: &Gathering, count: usize, distances: &mut Vec<f32>) -> f32 {
-        let q = self.grid.to_metric(at.place);
+        let q = self.grid.to_metric(at.position);
         distances.clear();
         let [x, [y0, y1], [z0, z1]] = self.grid.around(q, Vec3::ONE);
         for z in z0..=z1 {
@@ -132,16 +132,16 @@ impl PhotonMap {
             return 1.0;
         }
         let (_, nth, _) = distances.select_nth_unstable_by(count - 1, f32::total_cmp);
-        // Photons may lie on the very place; a sphere has some extent.
+        // Photons may lie on the very position; a sphere has some extent.
         nth.sqrt().max(1e-3)
     }
 }
 
-/// A number as good as drawn by lot, the same whenever the place is.
+/// A pseudo-random number that depends on the position alone.
 #[inline(always)]
-fn number_of(place: Vec3) -> usize {
+fn number_of(position: Vec3) -> usize {
     let mixed = |hash: u32, x: f32| (hash ^ x.to_bits()).wrapping_mul(0x9e37_79b9).rotate_left(15);
-    place.to_array().into_iter().fold(0, mixed) as usize
+    position.to_array().into_iter().fold(0, mixed) as usize
 }
 
 /// Optical depth within which fluence falls about as its linear fit does.

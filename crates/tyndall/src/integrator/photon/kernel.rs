@@ -6,7 +6,7 @@ use crate::simd::Lanes;
 use fearless_simd::prelude::*;
 use std::f32::consts::PI;
 
-/// A part of metric space about a place.
+/// A part of metric space about a position.
 pub(super) trait GatherRegion: Copy {
     /// How far it reaches where it is not flattened: all round, or about a ray.
     fn radius(&self) -> f32;
@@ -23,10 +23,10 @@ pub(super) trait GatherRegion: Copy {
     /// The same, but reaching along an axis no further than a share of the radius.
     fn flattened(self, axis: Vec3, share: f32) -> Self;
 
-    /// Whether it holds what lies so far from the place.
+    /// Whether it contains what lies so far from the position.
     fn holds<S: Lanes>(&self, simd: S, apart: [S::f32s; 3]) -> S::mask32s;
 
-    /// Points spread evenly through it, opposite ones in pairs, from a number on: relative to the place.
+    /// Points spread evenly through it, opposite ones in pairs, from a number on: relative to the position.
     fn points<S: Lanes>(&self, simd: S, first: usize) -> [S::f32s; 3];
 }
 

@@ -1,12 +1,12 @@
 //! How much matter photons have met where they are gathered.
 //!
 //! Photons lie where light collides, also where it is then absorbed: their flux in a part of space estimates the integral of
-//! extinction times fluence over it. \[Jonsson12, eq. 8\] divides by the scattering at the place alone, which is wrong at
+//! extinction times fluence over it. \[Jonsson12, eq. 8\] divides by the scattering at the position alone, which is wrong at
 //! every albedo but 1, and at the skin of matter, where half of the sphere holds none. Here fluence is taken to be linear
-//! about the place, `a + b x`, and fitted to the flux and its first moment, as local regression does at a border \[Fan92\]:
+//! about the position, `a + b x`, and fitted to the flux and its first moment, as local regression does at a border \[Fan92\]:
 //! with the moments `m0`, `m1`, `m2` of the extinction that is `a = sum (1 - c x) flux / (m0 - c m1)`, `c = m2^-1 m1`.
 //!
-//! Matter denser than the place counts as dense as the place, and its photons for so much less: else what the points miss of a
+//! Matter denser than the position counts as dense as the position, and its photons for so much less: else what the points miss of a
 //! dense neighbour, and the flux there, would light up all the thin matter about it.
 
 use super::kernel::GatherRegion;
@@ -32,17 +32,17 @@ pub(super) struct Matter {
     pub opacity: f32,
     /// A photon's weight falls by so much per radius.
     pub slope: Vec3,
-    /// The mean of its places relative to the query's, metric: to where it leans.
+    /// The mean of its positions relative to the query's, metric: to where it leans.
     pub lean: Vec3,
 }
 
 impl Matter {
-    /// About a place of index space, whose own opacity is given and positive; `to_index` takes metric vectors to index space.
+    /// About a position of index space, whose own opacity is given and positive; `to_index` takes metric vectors to index space.
     #[inline(always)]
     pub fn about<S: Lanes>(
         simd: S,
         medium: &Medium,
-        (place, own, lane): (Vec3, f32, usize),
+        (position, own, lane): (Vec3, f32, usize),
         to_index: &Mat3,
         kernel: &impl GatherRegion,
         notes: &mut impl MarchNotes<S>,
@@ -57,9 +57,9 @@ impl Matter {
         while first < MOST_LANES {
             let [x, y, z] = kernel.points(simd, first);
             let about = [
-                x * i.x + y * j.x + z * k.x + place.x,
-                x * i.y + y * j.y + z * k.y + place.y,
-                x * i.z + y * j.z + z * k.z + place.z,
+                x * i.x + y * j.x + z * k.x + position.x,
+                x * i.y + y * j.y + z * k.y + position.y,
+                x * i.z + y * j.z + z * k.z + position.z,
             ];
             let inside = medium.contains_lanes(simd, about);
             let value = medium.volume().value_lanes(simd, about);
@@ -72,7 +72,7 @@ impl Matter {
             (xy, xz, yz) = (ox.mul_add(y, xy), ox.mul_add(z, xz), oy.mul_add(z, yz));
             first += S::WIDTH;
         }
-        // The place itself is one of the points: there is matter, but for rounding.
+        // The position itself is one of the points: there is matter, but for rounding.
         let mean = (total(sum.as_slice()) + own) / (MOST_LANES + 1) as f32;
         if mean < LEAST_OPACITY {
             return Self { opacity: 0.0, slope: Vec3::ZERO, lean: Vec3::ZERO };

@@ -1,6 +1,6 @@
 //! Photon mapping that survives edits \[Jonsson12\].
 //!
-//! Light paths leave photons where they interact with matter (`paths`), sorted by place (`map`); rays from the camera gather
+//! Light paths leave photons where they interact with matter (`paths`), sorted by position (`map`); rays from the camera gather
 //! them, in segments (`segments`). Path and segment know the data values that they read, as a Historygram, so that an
 //! edit of the transfer function redoes those alone that read what it changed. Where photons changed is known too
 //! (`spatial`), for the segments that gather there.
@@ -242,7 +242,7 @@ impl Method for PhotonMapper {
             SegmentTile::new(pixels, per_ray, groups.count())
         });
         let view = View { scene, map: self.map.as_ref(), step, gather_spacing };
-        level.run(GatherSegments { view, segments, tile, groups, cells, places: &self.marks, stop });
+        level.run(GatherSegments { view, segments, tile, groups, cells, positions: &self.marks, stop });
     }
 
     fn report(&self, tiles: &[Option<SegmentTile>], _: &PixelCounts) -> MethodReport {

@@ -136,7 +136,7 @@ impl SegmentTile {
     }
 
     /// Forgets the segments that changes touch.
-    fn invalidate(&mut self, view: &View, pixels: &[[u32; 2]], places: &ChangeMarks) {
+    fn invalidate(&mut self, view: &View, pixels: &[[u32; 2]], positions: &ChangeMarks) {
         let Some(changed) = self.changed.take() else { return };
         if !changed.is_empty() {
             for i in 0..self.len() {
@@ -145,12 +145,12 @@ impl SegmentTile {
                 }
             }
         }
-        if places.everywhere() {
+        if positions.everywhere() {
             self.segments.fill(Segment::UNKNOWN);
-        } else if places.any() {
+        } else if positions.any() {
             for (ray, segments) in self.segments.chunks_exact_mut(self.per_ray).enumerate() {
                 if segments.iter().any(Segment::is_known) {
-                    forget_near(view, pixels[ray], places, segments);
+                    forget_near(view, pixels[ray], positions, segments);
                 }
             }
         }
@@ -233,13 +233,13 @@ fn ray_of(scene: &Scene, [x, y]: [u32; 2]) -> (Ray, Track) {
 }
 
 /// Forgets the segments of a ray that gather where photons changed.
-fn forget_near(view: &View, pixel: [u32; 2], places: &ChangeMarks, segments: &mut [Segment]) {
+fn forget_near(view: &View, pixel: [u32; 2], positions: &ChangeMarks, segments: &mut [Segment]) {
     let medium = &*view.scene.medium;
     let (_, track) = ray_of(view.scene, pixel);
     let count = track.steps(view.step);
     for cell in medium.majorants().walk_singly(&track) {
         // Nothing is gathered where there is no matter.
-        if cell.most <= 0.0 || !places.near_cell(cell.cell) {
+        if cell.most <= 0.0 || !positions.near_cell(cell.cell) {
             continue;
         }
         // A step more to either side, whatever rounding says about the border.
@@ -247,7 +247,7 @@ fn forget_near(view: &View, pixel: [u32; 2], places: &ChangeMarks, segments: &mu
         let last = cast::truncate(cell.end / view.step + 0.5).min(count - 1);
         for k in first..=last {
             let segment = &mut segments[segment_of(k, segments.len(), count)];
-            if segment.is_known() && places.near(track.at(track.midpoint(k, view.step))) {
+            if segment.is_known() && positions.near(track.at(track.midpoint(k, view.step))) {
                 *segment = Segment::UNKNOWN;
             }
         }
@@ -262,7 +262,7 @@ pub(super) struct GatherSegments<'a> {
     pub tile: &'a mut Tile,
     pub groups: &'a HistoryGroups,
     pub cells: &'a [Historygram],
-    pub places: &'a ChangeMarks,
+    pub positions: &'a ChangeMarks,
     pub stop: &'a Stop<'a>,
 }
 
@@ -271,9 +271,9 @@ impl Kernel for GatherSegments<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { view, segments, tile, groups, cells, places, stop } = self;
+        let Self { view, segments, tile, groups, cells, positions, stop } = self;
         let pixels: Vec<[u32; 2]> = tile.next(usize::MAX).0.collect();
-        segments.invalidate(&view, &pixels, places);
+        segments.invalidate(&view, &pixels, positions);
         let rays: Vec<(Ray, Track)> = pixels.iter().map(|&pixel| ray_of(view.scene, pixel)).collect();
         for (ray, _) in rays.iter().enumerate().filter(|(_, (_, track))| track.steps(view.step) == 0) {
             // Past the volume.

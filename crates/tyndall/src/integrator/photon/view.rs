@@ -106,11 +106,11 @@ impl View<'_> {
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
         let Some(map) = self.map else { return Rgb::BLACK };
-        let ViewSample { place, value, width, w_out, lane } = *sample;
+        let ViewSample { position, value, width, w_out, lane } = *sample;
         let medium = &*self.scene.medium;
         let optics = medium.transfer().optics(value);
-        let event = medium.event(place, &optics);
-        let at = Gathering { place, opacity: optics.opacity, event, w_out, width, lane };
+        let event = medium.event(position, &optics);
+        let at = Gathering { position, opacity: optics.opacity, event, w_out, width, lane };
         map.scattered(simd, medium, &at, distances, notes)
     }
 }
@@ -153,10 +153,10 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
         for lane in 0..S::WIDTH {
             let weight = weight.as_slice()[lane];
             if weight > 0.0 {
-                let [x, y, z] = sample.place;
-                let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
+                let [x, y, z] = sample.position;
+                let position = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
                 let here = ViewSample {
-                    place,
+                    position,
                     value: sample.value.as_slice()[lane],
                     width: width.as_slice()[lane],
                     w_out: -self.rays[lane].direction,
@@ -173,7 +173,7 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
 /// A sample of one ray.
 struct ViewSample {
     /// Index space.
-    place: Vec3,
+    position: Vec3,
     value: f32,
     /// World units of the ray that it stands for.
     width: f32,

@@ -76,11 +76,11 @@ impl RayMarch {
 
     /// What a point adds to a ray that goes along `w_out`, per unit of extinction.
     #[inline(always)]
-    fn source<S: Lanes>(&self, simd: S, scene: &Scene, place: Vec3, value: f32, w_out: Vec3) -> Rgb {
+    fn source<S: Lanes>(&self, simd: S, scene: &Scene, position: Vec3, value: f32, w_out: Vec3) -> Rgb {
         let medium = &*scene.medium;
         let optics = medium.transfer().optics(value);
-        let here = medium.volume().grid().index_to_world(place);
-        optics.emitted() + self.direct(simd, scene, &medium.event(place, &optics), here, w_out)
+        let here = medium.volume().grid().index_to_world(position);
+        optics.emitted() + self.direct(simd, scene, &medium.event(position, &optics), here, w_out)
     }
 
     /// Light from every lamp that a point scatters to `w_out`, per unit extinction.
@@ -132,10 +132,10 @@ impl<S: Lanes> Shader<S, ()> for DirectShader<'_> {
                     packet.shaded = lane;
                     return false;
                 }
-                let [x, y, z] = sample.place;
-                let place = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
+                let [x, y, z] = sample.position;
+                let position = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
                 let w_out = -packet.rays[lane].direction;
-                let source = raymarch.source(simd, scene, place, sample.value.as_slice()[lane], w_out);
+                let source = raymarch.source(simd, scene, position, sample.value.as_slice()[lane], w_out);
                 packet.radiance[lane] += source * covered;
                 *moved = true;
             }

@@ -16,7 +16,7 @@ fn otsu(profile: &Profile) -> f64 {
     let total: f64 = counts.iter().map(|&n| n as f64).sum();
     let moment: f64 = counts.iter().enumerate().map(|(i, &n)| i as f64 * n as f64).sum();
     let (mut below, mut below_moment) = (0.0, 0.0);
-    // Between well-parted classes the criterion is level: its middle is the natural place.
+    // Between well-parted classes the criterion is level: its middle is the natural threshold.
     let (mut best, mut first, mut last) = (-1.0, 0, 0);
     for (i, &n) in counts.iter().enumerate() {
         below += n as f64;

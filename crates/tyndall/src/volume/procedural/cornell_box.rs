@@ -37,7 +37,7 @@ pub(super) fn range() -> [f32; 2] {
 /// Half the thickness of the walls, of a room from -1 to 1.
 const WALL: f32 = 0.06;
 
-/// The material at a place of `[-1, 1]^3`: +y is up, the open side faces +z.
+/// The material at a position of `[-1, 1]^3`: +y is up, the open side faces +z.
 pub(super) fn material(p: Vec3) -> u8 {
     let floor = -1.0 + WALL;
     if p.x < -1.0 + WALL {
