@@ -128,7 +128,7 @@ impl Input {
 }
 
 /// Why what a document names cannot be had.
-pub(crate) fn of_assets(source: AssetError, at: &str) -> LiveError {
+fn of_assets(source: AssetError, at: &str) -> LiveError {
     match source {
         AssetError::Volume(_) => LiveError::Volume(Box::new(source)),
         // Of the others each begins with a key.

@@ -5,7 +5,7 @@ use crate::assets::{self, Assets, Source};
 use crate::build::Built;
 use crate::document::{self, Document};
 use crate::error::LiveError;
-use crate::input::{Input, LoadedScene, of_assets};
+use crate::input::{Input, LoadedScene};
 use crate::options::Options;
 use crate::undo::UndoList;
 use serde_json::Value;
@@ -186,7 +186,7 @@ impl LiveSession {
             .options
             .threads
             .install(|| assets::reload(&document, &self.folder, before))
-            .map_err(|error| of_assets(error, at))?;
+            .map_err(|source| LiveError::Asset { at: at.to_owned(), source: Box::new(source) })?;
         Ok((document, assets))
     }
 

@@ -1,4 +1,4 @@
-//! A method at work on a scene, whatever method it is: what a session drives.
+//! A running method, whichever it is: what a session drives.
 
 use super::Limits;
 use super::method::{
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use schemars::{Schema, SchemaGenerator};
 use serde_json::Value;
 
-/// A [`Method`] at work, with what it keeps of each tile; nothing here is called once for a sample.
+/// A running [`Method`] with the state of each tile. Called once per pass, never per sample.
 pub(crate) trait Engine: Send + Sync {
     /// See [`Method::is_touched_by`].
     fn is_touched_by(&self, difference: &Difference) -> bool;
@@ -84,7 +84,7 @@ impl<M: Method> Engine for Driver<M> {
     }
 }
 
-/// A method as the list of methods has it: what is asked of it before it is at work.
+/// An entry in the list of methods: what can be asked of a method before it runs.
 #[derive(Debug)]
 pub struct MethodEntry {
     /// See [`Method::NAME`].
@@ -185,7 +185,7 @@ impl MethodEntry {
         (self.memory)(scene)
     }
 
-    /// The method at work on a scene, with nothing computed yet.
+    /// Starts the method on a scene, with nothing computed yet.
     pub(crate) fn start(&self, scene: &Scene, resources: &Resources) -> Box<dyn Engine> {
         (self.start)(scene, resources)
     }

@@ -22,7 +22,7 @@ pub trait Method: Sized + Send + Sync + 'static {
     /// What it is, in a sentence for lists and for the document's schema.
     const ABOUT: &'static str;
 
-    /// Whether samples of a pixel differ by chance, so that a picture has an error to be told.
+    /// Whether samples of a pixel are random, so that the picture has an error estimate.
     const HAS_NOISE: bool = true;
 
     /// Whether light bends where the refractive index changes; else a scene with an index is told that it is ignored.
@@ -43,10 +43,10 @@ pub trait Method: Sized + Send + Sync + 'static {
         + Sync
         + 'static;
 
-    /// What it keeps of a tile beside its pixels; the default is that of a tile not yet begun.
+    /// State kept for each tile beside its pixels; the default is that of a tile not yet begun.
     type TileState: Default + Send + Sync + 'static;
 
-    /// Finds fault with settings that the schema cannot find fault with.
+    /// Checks what a JSON Schema cannot express.
     ///
     /// # Errors
     /// [`SettingProblem`] for the first setting that cannot be.
@@ -61,19 +61,19 @@ pub trait Method: Sized + Send + Sync + 'static {
         settings.clone()
     }
 
-    /// What the method leaves out of this scene, or does otherwise than a user may expect, a sentence each.
+    /// What the method leaves out of this scene, or does differently from what a user may expect; one sentence each.
     fn notes(settings: &Self::Settings, scene: &Scene) -> Vec<&'static str> {
         let _ = (settings, scene);
         Vec::new()
     }
 
-    /// The most memory that it may need for a scene beside film and medium; `None` where that is not worth asking.
+    /// The most memory that it may need for a scene beyond film and medium; `None` if that is negligible.
     fn memory(settings: &Self::Settings, scene: &Scene) -> Option<MemoryNeed> {
         let _ = (settings, scene);
         None
     }
 
-    /// Prepares the method for a scene. Nothing is computed yet that takes long.
+    /// Prepares the method for a scene, without any long computation.
     fn new(scene: &Scene, settings: &Self::Settings, resources: &Resources) -> Self;
 
     /// Whether samples taken before an edit may differ, by a bit or more, from those that would be taken now.
@@ -91,7 +91,7 @@ pub trait Method: Sized + Send + Sync + 'static {
         let _ = tiles;
     }
 
-    /// Makes ready what the next sample of all pixels needs, whose number is `sample`; false where a stop came first.
+    /// Prepares what sample number `sample` of all pixels needs; false if a stop came first.
     fn prepare(&mut self, scene: &Scene, sample: u32, limits: &Limits) -> bool {
         let _ = (scene, sample, limits);
         true
@@ -156,7 +156,7 @@ impl<M: Method> MethodSettings for Chosen<M> {
 pub struct Resources {
     /// Vector instructions.
     pub level: Level,
-    /// Bytes that it may fill, as far as its settings go, with what serves edits to come alone; 0 where none will come.
+    /// Bytes that it may use, within its settings, for what only future edits need; 0 if there will be none.
     pub edit_memory: usize,
 }
 
@@ -194,7 +194,7 @@ pub struct SettingProblem {
 /// Memory that a method may need.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryNeed {
-    /// Bytes at most, but for chance.
+    /// Most bytes to be expected; random path lengths may exceed it slightly.
     pub bytes: u64,
     /// The setting that it depends on most.
     pub key: &'static str,
@@ -226,7 +226,7 @@ pub struct MethodReport {
     pub items_computed: Option<usize>,
     /// Further counts that benches ask for.
     pub counts: Vec<NamedCount>,
-    /// What the time goes into that passes: before samples are taken, and while they are. The first may be nothing.
+    /// Names of the two stages that time is spent on: before samples are taken, and while they are.
     pub stages: StageNames,
 }
 

@@ -4,8 +4,8 @@ use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// What integrators ask after every scattering, so that a stop takes microseconds: whether somebody cancelled the work, or
-/// its time is over. One per piece of work, since it counts how often it was asked.
+/// What integrators poll after every scattering, so that a stop takes microseconds: whether the work was cancelled or its deadline
+/// has passed. One for each task, since it counts how often it was polled.
 #[derive(Clone, Debug)]
 pub struct Stop<'a> {
     cancel: &'a AtomicBool,
@@ -14,7 +14,7 @@ pub struct Stop<'a> {
     expired: Cell<bool>,
 }
 
-/// When work is to end: what every piece of it, on whatever thread, makes its [`Stop`] of.
+/// When work must end; each task, on any thread, makes its own [`Stop`] from it.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits<'a> {
     /// Raised from elsewhere to stop soon.
@@ -24,14 +24,14 @@ pub struct Limits<'a> {
 }
 
 impl<'a> Limits<'a> {
-    /// What one piece of work asks.
+    /// The stop of one task.
     #[must_use]
     pub fn stop(&self) -> Stop<'a> {
         Stop::when(self.cancel, self.deadline)
     }
 }
 
-/// The clock is read at the first of so many questions: it takes some 30 ns, a scattering takes hundreds.
+/// The clock is read once in so many polls: reading it takes some 30 ns, a scattering takes hundreds.
 const QUESTIONS: u32 = 16;
 
 /// Never raised.
@@ -50,7 +50,7 @@ impl<'a> Stop<'a> {
         Self::when(&NEVER, None)
     }
 
-    /// Whether to stop now; once so, always so.
+    /// Whether to stop now; once true, it stays true.
     #[inline]
     #[must_use]
     pub fn reached(&self) -> bool {

@@ -25,7 +25,7 @@ impl<S: Lanes> Coverage<S> {
     }
 }
 
-/// What finds the light that a packet's samples send along their rays.
+/// Computes the light that a packet's samples send along their rays.
 pub(crate) trait Shader<S: Lanes, N> {
     /// Shades a sample of each ray, of which the viewer sees the share `covered`, 0 in lanes that take none; false to stop
     /// before the samples count.

@@ -24,7 +24,7 @@ impl Directional {
     #[must_use]
     pub fn new(travel: Vec3, irradiance: Rgb, angle: f32) -> Self {
         let half = 0.5 * angle.to_radians();
-        // 1 - cos without cancellation. A narrower cone is sharp: single precision tells its directions not apart.
+        // 1 - cos without cancellation. In a narrower cone all directions are equal in single precision: treat it as sharp.
         let cap = if half < NARROWEST { 0.0 } else { 2.0 * (0.5 * half).sin().powi(2) };
         Self { frame: Frame::around(-travel.normalize()), irradiance, cap }
     }

@@ -52,7 +52,7 @@ impl LightSet {
         self.visible().map(|environment| environment.radiance(direction)).sum()
     }
 
-    /// Whether it sees one.
+    /// Whether there is a visible environment.
     #[must_use]
     pub fn has_sky(&self) -> bool {
         self.visible().next().is_some()

@@ -2,7 +2,7 @@
 //!
 //! Both walk the cells of the [`MajorantGrid`](super::MajorantGrid) and know of each the smallest and
 //! the largest extinction. Where these agree the cell is homogeneous and nothing is looked up. A step too
-//! short for single precision still goes on by the last place, so that no walk stands still.
+//! short for single precision still advances by one unit in the last place, so that no flight gets stuck.
 
 use super::{CellStretch, MOST_LANES, Medium, Track};
 use crate::math::Vec3;
@@ -10,7 +10,7 @@ use crate::sampling::Stream;
 use crate::simd::{Kernel, Lanes, Level};
 use fearless_simd::prelude::*;
 
-/// Below this weight a transmittance estimate lives on by chance: darker ones are not worth their look-ups.
+/// Below this weight a transmittance estimate is subject to Russian roulette: darker ones are not worth their look-ups.
 const ROULETTE_WEIGHT: f32 = 0.1;
 
 /// Optical thickness of the control after which the same holds.
@@ -27,9 +27,9 @@ pub struct Collision {
     pub value: f32,
 }
 
-/// What hears of all that a flight or a transmittance reads.
+/// Listener to all that a flight or a transmittance estimate reads.
 pub(crate) trait FlightNotes {
-    /// Whether anybody listens; then empty cells are crossed one by one, so that each is told.
+    /// Whether there is a listener; then empty cells are crossed one by one, so that each is reported.
     const LISTENS: bool = true;
 
     /// The majorant of a cell.
@@ -42,7 +42,7 @@ pub(crate) trait FlightNotes {
     fn value(&mut self, value: f32);
 }
 
-/// Nobody listens.
+/// No listener.
 impl FlightNotes for () {
     const LISTENS: bool = false;
 
@@ -68,8 +68,8 @@ impl Medium {
         self.free_flight_noting(track, first, stream, &mut ())
     }
 
-    /// [`Self::free_flight`] that tells all that it reads, and that nothing else can change: the numbers that it draws depend
-    /// on the majorant of each cell that it crosses, and on no other's.
+    /// [`Self::free_flight`] that reports all that it depends on: the numbers that it draws depend on the majorants of the cells
+    /// that it crosses, and on no other.
     #[inline(always)]
     pub(crate) fn free_flight_noting<N: FlightNotes>(
         &self,

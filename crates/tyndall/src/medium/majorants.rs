@@ -12,8 +12,8 @@ pub struct MajorantGrid {
     dims: [i32; 3],
     edge: f32,
     opacities: Vec<[f32; 2]>,
-    /// Per cell how many cells on to every side end what is empty around it, itself included, so that a ray crosses it in one
-    /// stretch; 0 where there is matter. For kernels over lanes, which may read some bytes past a cell's.
+    /// Per cell the distance, in cells, to the nearest cell with matter (chessboard metric), so that a ray leaps over the empty cells
+    /// between; 0 where there is matter. Padded, since kernels over lanes may read a few bytes past a cell's.
     empty: Vec<u8>,
 }
 
@@ -70,7 +70,7 @@ impl MajorantGrid {
         cast::index(self.edge)
     }
 
-    /// Per cell how many cells on to each side end what is empty around it, itself included; 0 where there is matter.
+    /// Per cell the distance, in cells, to the nearest cell with matter (chessboard metric); 0 where there is matter.
     pub(super) fn empty(&self) -> &[u8] {
         &self.empty
     }
@@ -83,7 +83,7 @@ impl MajorantGrid {
     }
 
     /// The cells along a track in order, each by itself. Stretches with matter are those of [`Self::walk`] to the last bit, so
-    /// that what is reckoned along them does not depend on what is empty beside the way.
+    /// that results computed along them do not depend on empty space beside the ray.
     #[inline]
     #[must_use]
     pub fn walk_singly(&self, track: &Track) -> CellWalk<'_, false> {
@@ -148,8 +148,8 @@ impl Axis {
         self.next = self.exit(position);
     }
 
-    /// Past exactly those borders that come before another axis's at distance `leave`; of borders at one distance those of
-    /// the `higher` axis come first, as [`nearest`] has it.
+    /// Moves past exactly those borders that come before another axis's at distance `leave`; of borders at equal distances those of
+    /// the `higher` axis come first, as in [`nearest`].
     #[inline(always)]
     fn leap(&mut self, leave: f32, higher: bool) {
         if self.sign == 0 {
@@ -216,7 +216,7 @@ impl<const LEAPS: bool> Iterator for CellWalk<'_, LEAPS> {
             let start = self.start;
             let end = leave.min(self.length);
             if end < self.length {
-                // Not by index, so that all stays in registers.
+                // Not indexed, so that all stays in registers.
                 for axis in 0..3 {
                     let along = &mut self.axes[axis];
                     if axis == through {

@@ -176,7 +176,7 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
         self.go_to(k);
     }
 
-    /// The next samples of which one at least met matter; `notes` hears of all that is read. No lane's bits depend on what is in
+    /// The next samples of which one at least met matter; `notes` is told of all that is read. No lane's bits depend on what is in
     /// the others.
     #[inline(always)]
     pub fn next<N: MarchNotes<S>>(&mut self, notes: &mut N) -> Option<PacketSample<S>> {

@@ -2,7 +2,7 @@
 
 use crate::simd::Lanes;
 
-/// What hears of all that the lanes of a packet read.
+/// Listener to all that the lanes of a packet read.
 pub(crate) trait MarchNotes<S: Lanes> {
     /// Whether what is empty is crossed cell by cell, so that each is told.
     const EACH_CELL: bool;
@@ -17,7 +17,7 @@ pub(crate) trait MarchNotes<S: Lanes> {
     fn cells(&mut self, simd: S, lanes: S::mask32s, cells: S::u32s);
 }
 
-/// Nobody listens.
+/// No listener.
 impl<S: Lanes> MarchNotes<S> for () {
     const EACH_CELL: bool = false;
 

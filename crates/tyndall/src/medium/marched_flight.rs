@@ -29,7 +29,7 @@ impl MarchedCollision {
 impl Medium {
     /// Flies through so much optical depth, or out of the medium (`None`), by a march with steps of `step` world units in each
     /// of which extinction counts as that of its middle. For an exponentially distributed depth, distances have the density
-    /// that the collision tells; it is biased by the march, unlike that of [`Self::free_flight`], which nobody knows.
+    /// that the collision tells; it is biased by the march, unlike [`Self::free_flight`], whose density is unknown.
     #[must_use]
     pub fn marched_flight(&self, track: &Track, depth: f32, step: f32) -> Option<MarchedCollision> {
         let steps = Steps::new(track, step);

@@ -32,7 +32,7 @@ use std::sync::Arc;
 pub struct MediumSettings {
     /// Extinction per world unit at opacity 1; at least 0.
     pub density: f32,
-    /// How light turns where it scatters.
+    /// The phase function.
     pub phase: Phase,
     /// How light is reflected where the data have a surface.
     pub brdf: Brdf,
@@ -65,7 +65,7 @@ pub struct Medium {
 /// enters to where it leaves or ends.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Track {
-    /// Starts where the medium does, which keeps distances small and so exact.
+    /// Starts at the medium's border, which keeps distances small and so precise.
     ray: Ray,
     /// World distance through the medium.
     length: f32,
@@ -209,7 +209,7 @@ impl Medium {
             return Track { ray: inside, length: 0.0, before: 0.0 };
         }
         let ray = Ray::new(inside.at(stretch.start), inside.direction);
-        // From very far away the difference of the two distances may be anything.
+        // From very far away the difference of the two distances is all rounding error.
         let length = (stretch.end - stretch.start).min(self.longest);
         Track { ray, length, before: stretch.start }
     }

@@ -29,7 +29,7 @@ impl LightPathSampler {
     /// Paths among which the numbers of one dimension are spread evenly.
     pub const STRATIFIED: u32 = SEQUENCE;
 
-    /// Where and whereto the path begins.
+    /// The four numbers that decide where and in which direction the path starts.
     #[must_use]
     pub fn emission(&self) -> [f32; 4] {
         sample_4d(self.path % SEQUENCE, 0, self.scramble)

@@ -64,7 +64,7 @@ impl PathSampler {
         Self { index: sample % SEQUENCE, scramble, stream }
     }
 
-    /// Place in the pixel, then on the lens.
+    /// Position in the pixel, then on the lens.
     #[must_use]
     pub fn camera(&self) -> ([f32; 2], [f32; 2]) {
         let [x, y, u, v] = sample_4d(self.index, 0, self.scramble);

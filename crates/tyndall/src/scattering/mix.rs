@@ -3,9 +3,9 @@
 //!
 //! Per unit extinction `sigma_s s / sigma_t = (1-q) albedo phase + q f_r(w_in, w_out) |n . w_in|`.
 //! The cosine belongs to the side where the light comes from, whichever way the walk goes, so with
-//! `q > 0` the whole is not symmetric: a light walk weights by the same value with the same `w_in`.
+//! `q > 0` the whole is not symmetric: a light path weights by the same value with the same `w_in`.
 
-use super::{Brdf, Phase, Surface, Walk};
+use super::{Brdf, Phase, Surface, TransportMode};
 use crate::math::{Rgb, Vec3};
 
 /// How far a point scatters as a surface: `surface (1 - exp(-gradient_factor |grad v| h / range))`.
@@ -46,7 +46,7 @@ pub struct Event {
 /// A drawn direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Unit vector that leaves the point: `w_in` of a camera walk, `w_out` of a light walk. The walk's
+    /// Unit vector that leaves the point: `w_in` of a camera path, `w_out` of a light path. The walk's
     /// next direction of travel.
     pub direction: Vec3,
     /// `eval / pdf`.
@@ -68,13 +68,13 @@ impl Event {
         matter + self.brdf.eval(normal, w_in, w_out, &self.surface) * (q * normal.dot(w_in).abs())
     }
 
-    /// In a camera walk: draws where the light comes from. `None` is light that was lost, a weight of 0.
+    /// In a camera path: draws where the light comes from. `None` is light that was lost, a weight of 0.
     ///
     /// `u` are uniform numbers in [0, 1); the last one chooses the lobe.
     #[inline]
     #[must_use]
     pub fn sample(&self, w_out: Vec3, u: [f32; 3]) -> Option<Sample> {
-        let (direction, pdf) = self.draw(Walk::Camera, w_out, u)?;
+        let (direction, pdf) = self.draw(TransportMode::Camera, w_out, u)?;
         Some(Sample { direction, weight: self.eval(w_out, direction) / pdf, pdf })
     }
 
@@ -82,16 +82,16 @@ impl Event {
     #[inline]
     #[must_use]
     pub fn pdf(&self, w_out: Vec3, w_in: Vec3) -> f32 {
-        self.density(Walk::Camera, w_out, w_in)
+        self.density(TransportMode::Camera, w_out, w_in)
     }
 
-    /// In a light walk: draws where the light goes. The weight keeps `|n . w_in|`, though `w_out` is drawn.
+    /// In a light path: draws where the light goes. The weight keeps `|n . w_in|`, though `w_out` is drawn.
     ///
     /// `u` are uniform numbers in [0, 1); the last one chooses the lobe.
     #[inline]
     #[must_use]
     pub fn sample_adjoint(&self, w_in: Vec3, u: [f32; 3]) -> Option<Sample> {
-        let (direction, pdf) = self.draw(Walk::Light, w_in, u)?;
+        let (direction, pdf) = self.draw(TransportMode::Light, w_in, u)?;
         Some(Sample { direction, weight: self.eval(direction, w_in) / pdf, pdf })
     }
 
@@ -99,10 +99,10 @@ impl Event {
     #[inline]
     #[must_use]
     pub fn pdf_adjoint(&self, w_in: Vec3, w_out: Vec3) -> f32 {
-        self.density(Walk::Light, w_in, w_out)
+        self.density(TransportMode::Light, w_in, w_out)
     }
 
-    fn draw(&self, walk: Walk, known: Vec3, u: [f32; 3]) -> Option<(Vec3, f32)> {
+    fn draw(&self, walk: TransportMode, known: Vec3, u: [f32; 3]) -> Option<(Vec3, f32)> {
         let (normal, _) = self.side();
         let on_surface = self.surface_chance(walk, known)?;
         let direction = if u[2] < on_surface {
@@ -115,7 +115,7 @@ impl Event {
         (pdf > 0.0).then_some((direction, pdf))
     }
 
-    fn density(&self, walk: Walk, known: Vec3, drawn: Vec3) -> f32 {
+    fn density(&self, walk: TransportMode, known: Vec3, drawn: Vec3) -> f32 {
         let (normal, _) = self.side();
         let Some(on_surface) = self.surface_chance(walk, known) else {
             return 0.0;
@@ -130,7 +130,7 @@ impl Event {
     /// Chance of drawing by the BRDF: its share of what is scattered, so that weights stay bounded.
     /// `None` if nothing is.
     #[inline]
-    fn surface_chance(&self, walk: Walk, known: Vec3) -> Option<f32> {
+    fn surface_chance(&self, walk: TransportMode, known: Vec3) -> Option<f32> {
         let (normal, q) = self.side();
         let matter = (1.0 - q) * self.surface.albedo.max_component();
         let surface = if q > 0.0 {
@@ -260,12 +260,12 @@ mod tests {
                 |u| event.sample(known, u).map(|s| s.direction.to_array()),
                 |w| f64::from(event.pdf(known, Vec3::from_array(w))),
             );
-            assert!(camera.passes(), "camera walk, {event:?}, {degrees} degrees: {camera}");
+            assert!(camera.passes(), "camera path, {event:?}, {degrees} degrees: {camera}");
             let light = test.directions(
                 |u| event.sample_adjoint(known, u).map(|s| s.direction.to_array()),
                 |w| f64::from(event.pdf_adjoint(known, Vec3::from_array(w))),
             );
-            assert!(light.passes(), "light walk, {event:?}, {degrees} degrees: {light}");
+            assert!(light.passes(), "light path, {event:?}, {degrees} degrees: {light}");
         }
     }
 

@@ -8,7 +8,7 @@
 //! `cos_theta = -(w_in . w_out)`.
 //!
 //! A walk from the camera along `d` knows `w_out = -d` and draws `w_in`, its next direction; a walk
-//! from a light along `d` knows `w_in = -d` and draws `w_out`, its next direction. See [`Walk`].
+//! from a light along `d` knows `w_in = -d` and draws `w_out`, its next direction. See [`TransportMode`].
 
 pub mod brdf;
 pub mod mix;
@@ -25,7 +25,7 @@ use std::f32::consts::TAU;
 
 /// Where a walk began, and so which of the two directions at a scattering it knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Walk {
+pub enum TransportMode {
     /// From the camera, against the light: knows `w_out`, draws `w_in`.
     Camera,
     /// From a light, with the light: knows `w_in`, draws `w_out`.

@@ -4,8 +4,8 @@ use super::Scene;
 use crate::transfer::TransferDifference;
 use std::collections::HashMap;
 
-/// What of one scene is no longer so in another, by what light reads. What only shows pictures (exposure, tone) or stops
-/// them (samples) is no part of a scene and never differs.
+/// What changed from one scene to another, in terms of what light transport reads. Settings of display (exposure, tone) and of
+/// stopping (samples) are not part of a scene.
 #[derive(Clone, Debug, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a thing by itself that changed or did not")]
 pub struct Difference {
@@ -14,7 +14,7 @@ pub struct Difference {
     /// The new density over the old where that alone moved extinction; `None` where it did not change. Infinite where
     /// there was none before.
     pub density: Option<f32>,
-    /// How light turns where it scatters.
+    /// The phase function.
     pub phase: bool,
     /// How surfaces reflect, or how strong a gradient makes one, where matter has any.
     pub surfaces: bool,
@@ -22,7 +22,7 @@ pub struct Difference {
     pub clip: bool,
     /// Samples, grid or interpolation.
     pub volume: bool,
-    /// Edge of the majorant cells: what tracking draws, not what it means.
+    /// Edge of the majorant cells, which changes the numbers that tracking draws but not the expected picture.
     pub majorants: bool,
     /// What became of the lights.
     pub lights: LightsDifference,
@@ -45,7 +45,7 @@ pub struct LightsDifference {
     pub origins: Vec<LightOrigin>,
     /// Numbers of the old lights that are gone.
     pub removed: Vec<usize>,
-    /// Whether names are others, or stand elsewhere: methods draw other random numbers where these follow names.
+    /// Whether any light's name changed or moved to another light: random numbers that are keyed by name then change.
     pub names: bool,
 }
 
@@ -54,7 +54,7 @@ pub struct LightsDifference {
 pub enum LightOrigin {
     /// It is the old scene's light of this number, as it was.
     Same(usize),
-    /// It is the old scene's light of this number, but shines otherwise.
+    /// It is the old scene's light of this number, changed.
     Changed(usize),
     /// It was not there.
     New,
@@ -97,13 +97,13 @@ impl Difference {
             || !self.transfer.ior.is_empty())
     }
 
-    /// Whether the rays that look, or what is done with them, are others.
+    /// Whether view rays, or what is done with them, changed.
     #[must_use]
     pub fn view(&self) -> bool {
         self.camera || self.size || self.background || self.method
     }
 
-    /// Whether light goes other ways through the matter, as long as it goes straight: all but the refractive index.
+    /// Whether light transport along straight rays changed: everything but the refractive index.
     #[must_use]
     pub fn light(&self) -> bool {
         let Self { transfer, .. } = self;
@@ -128,7 +128,7 @@ impl LightsDifference {
         let origins = (0..is.len())
             .map(|i| {
                 let of_name = new_names[i].as_ref().and_then(|name| old_numbers.get(name).copied());
-                // An old light whose name is still borne is the one that bears it.
+                // An old light whose name still exists is matched by that name.
                 let borne =
                     |i: usize| old_names[i].as_ref().is_some_and(|name| new_numbers.contains_key(name));
                 let of_number = || (i < was.len() && !borne(i)).then_some(i);
@@ -141,8 +141,8 @@ impl LightsDifference {
         Self { origins, removed, names: old_names != new_names }
     }
 
-    /// Whether all lights are as they were, whatever their names, and in the same order: methods that choose among them by
-    /// number see no difference.
+    /// Whether all lights are unchanged and in the same order, whatever their names: methods that choose lights by index see no
+    /// difference.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         let in_place = |(i, origin): (usize, &LightOrigin)| *origin == LightOrigin::Same(i);

@@ -17,11 +17,11 @@ use std::sync::Arc;
 pub struct Scene {
     /// The matter.
     pub medium: Arc<Medium>,
-    /// What shines on it.
+    /// The lights.
     pub lights: Arc<LightSet>,
     /// Names by which edits find the lights, one per light.
     pub light_names: Vec<Option<String>>,
-    /// Who looks.
+    /// The camera.
     pub camera: Camera,
     /// Width and height of the picture; at least 1 each.
     pub size: [u32; 2],

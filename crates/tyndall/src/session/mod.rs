@@ -169,9 +169,8 @@ impl Session {
         self.film.image()
     }
 
-    /// Works until the budget is spent: pass by pass over all tiles, so that the picture is complete
-    /// as early as can be. Every sample follows from its pixel and number, so threads and slices leave
-    /// no trace in the bits.
+    /// Works until the budget is spent, pass by pass over all tiles, so that the picture is complete as early as possible. Every
+    /// sample follows from its pixel and number, so the bits do not depend on threads or slices.
     pub fn refine(&mut self, budget: &Budget) -> Progress {
         let limits = Limits { cancel: &budget.cancel, deadline: budget.deadline };
         let Self { scene, engine, film, threads, spent, .. } = self;
@@ -183,7 +182,7 @@ impl Session {
             if !prepared {
                 break;
             }
-            // Several passes at once, as soon as that delays no picture much, spare threads the waiting for each other.
+            // Once it delays no picture noticeably, several passes at once save threads from waiting for each other.
             let passes = (so_far / 4).clamp(1, 16).min(engine.samples_at_once());
             let pass = so_far.saturating_add(passes).min(budget.samples);
             let begun = Instant::now();

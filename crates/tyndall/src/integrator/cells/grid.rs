@@ -1,13 +1,14 @@
-//! A grid of cells as wide as a gather reaches: what it takes lies in its place's cell or a neighbour's.
+//! A grid whose cells are as wide as a gather's radius: a gather finds everything in its own cell and the neighbouring ones.
 
 use crate::math::{Bounds, DMat3, DVec3, Mat3, Vec3, cast};
 use crate::volume::Grid;
 
-/// Cells at most: where the radius would ask for more, they are wider than it.
+/// Largest number of cells: a smaller radius gets wider cells.
 const MOST_CELLS: f32 = (1 << 24) as f32;
 
-/// A cell is wider than the radius by more than single precision errs in a position, so that a position put into the cell beside
-/// its own still has all that it gathers in the neighbourhood. In a volume of many radii that is a share of its extent.
+/// Margin by which a cell is wider than the radius: more than the rounding error of a position in single precision, so that a
+/// position rounded into the neighbouring cell still finds all within its radius. In a volume many radii wide the error grows
+/// with its extent.
 const MARGIN: f32 = 1e-4;
 const MARGIN_OF_EXTENT: f32 = 1.0 / (1 << 22) as f32;
 
@@ -47,7 +48,7 @@ impl CellGrid {
             edge *= 1.1;
         }
         let dims = cells(edge).to_array().map(cast::index);
-        // A box reaches as far along an axis of index space as the entries of its row of the inverse say together.
+        // The extent of a box along an axis of index space is the sum of the absolute entries of that row of the inverse.
         let rows = to_index.transpose();
         let entries = |row: Vec3| row.abs().element_sum();
         let box_ = Vec3::new(entries(rows.x_axis), entries(rows.y_axis), entries(rows.z_axis));

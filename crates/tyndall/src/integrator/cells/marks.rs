@@ -1,5 +1,5 @@
-//! The spatial history \[Jonsson12, sec. 4.3.2\]: where things appeared, moved or vanished, asked for by what reads them within
-//! reach.
+//! The spatial history \[Jonsson12, sec. 4.3.2\]: marks of where items appeared, moved or vanished, queried by whatever reads
+//! items within reach.
 
 use super::Positioned;
 use super::grid::CellGrid;
@@ -9,21 +9,21 @@ use bytemuck::Pod;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 
-/// Positions at which things changed, marked by many threads at once.
+/// Positions at which items changed, marked by many threads concurrently.
 #[derive(Debug)]
 pub(crate) struct ChangeMarks {
     kind: MarkKind,
     any: AtomicBool,
-    /// Positions marked, and how many make it not worth asking for one.
+    /// Number of marked positions, and the number past which every position counts as marked.
     marks: AtomicUsize,
     enough: usize,
 }
 
 #[derive(Debug)]
 enum MarkKind {
-    /// Nobody asks.
+    /// No marks are kept.
     Off,
-    /// A bit for each cell of the grid from which a changed thing is within reach.
+    /// A bit for each cell of the grid from which a changed item is within reach.
     /// And one for each majorant cell, which is asked first.
     Cells { grid: CellGrid, near: Vec<AtomicU64>, coarse: Arc<Cells>, near_coarse: Vec<AtomicU64> },
     /// Of each axis 64 bits, the paper's way: saturates soon.
@@ -76,7 +76,7 @@ impl ChangeMarks {
         self.marks.load(Ordering::Relaxed) > self.enough
     }
 
-    /// Marks what is another than it was, from the first such thing on, or is to count as changed `otherwise`.
+    /// Marks items that differ from those before, from the first difference on, and those that count as changed `otherwise`.
     pub fn mark_difference<P: Positioned + Pod>(&self, old: &[P], new: &[P], otherwise: impl Fn(&P) -> bool) {
         let same =
             |(old, new): (&P, &P)| bytemuck::bytes_of(old) == bytemuck::bytes_of(new) && !otherwise(new);
@@ -85,7 +85,7 @@ impl ChangeMarks {
         self.mark_all(&new[same..]);
     }
 
-    /// Marks where things are.
+    /// Marks the positions of items.
     pub fn mark_all(&self, things: &[impl Positioned]) {
         if matches!(self.kind, MarkKind::Off) || things.is_empty() {
             return;

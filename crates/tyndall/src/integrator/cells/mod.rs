@@ -1,4 +1,4 @@
-//! Things with a position in the cells of a grid: sorted by cell, and marked cell by cell where they changed.
+//! Items with a position, in the cells of a grid: sorted by cell, and marked cell by cell where they changed.
 
 mod grid;
 mod marks;
@@ -10,7 +10,7 @@ pub(crate) use sorted::{CellStarts, KEY_BYTES, SortedItems};
 
 use crate::math::Vec3;
 
-/// Something that is at one position.
+/// An item at one position.
 pub(crate) trait Positioned: Send + Sync {
     /// In index space.
     fn position(&self) -> Vec3;

@@ -1,8 +1,8 @@
-//! From which values the limits of cells come: a flight that crosses a cell depends on these, not on all that the cell holds.
+//! Which values a cell's opacity bounds come from: a flight that crosses a cell depends on these, not on all values in the cell.
 //!
 //! A flight notes the groups that attain a cell's majorant. As long as their opacity stays, the majorant can only rise, by other
 //! groups; an edit that does so asks for the groups that attained the old one. A flight that neither meets has read the
-//! same majorants. The smallest opacity, which transmittance is reckoned from too, is noted the same way.
+//! same majorants. The smallest opacity, which transmittance estimates also use, is recorded the same way.
 
 use super::touched::around;
 use crate::medium::{MajorantGrid, Medium};
@@ -10,7 +10,7 @@ use crate::transfer::{HistoryGroups, Historygram, TransferFunction};
 use crate::volume::ValueBins;
 use rayon::prelude::*;
 
-/// What rounding may do to an opacity at most, as a share and by itself; more groups than need be attain a limit then.
+/// Bound of an opacity's rounding error, relative and absolute; with it a few groups too many count as attaining a bound.
 const ROUNDING: (f32, f32) = (1e-4, 1e-6);
 
 /// Of each majorant cell what its limits come from.
@@ -41,7 +41,7 @@ impl Bounds {
         Self(cells.par_iter().zip(medium.majorants().opacities()).map(of_cell).collect())
     }
 
-    /// What a flight depends on that reads a cell's majorant.
+    /// What a flight depends on when it reads a cell's majorant.
     #[inline(always)]
     pub fn most(&self, cell: usize) -> Historygram {
         self.0[cell].most
@@ -54,8 +54,8 @@ impl Bounds {
         least | most
     }
 
-    /// What is to be asked for beside the groups whose opacity an edit changed: where smallest opacities sink, and where
-    /// majorants rise; of empty cells the groups that changed are enough.
+    /// What must be queried in addition to the groups whose opacity an edit changed: groups of cells whose smallest opacity falls
+    /// or whose majorant rises. For empty cells the changed groups suffice.
     pub fn moved(&self, old: &MajorantGrid, new: &MajorantGrid) -> [Historygram; 2] {
         let mut query = [Historygram::EMPTY; 2];
         for ((old, new), attained) in old.opacities().iter().zip(new.opacities()).zip(&self.0) {

@@ -1,4 +1,4 @@
-//! PackedHistories: which data values a computation has read, and what an edit asks of them \[Jonsson12, sec. 4.2\].
+//! Histories: which data values a computation has read, and what an edit asks of them \[Jonsson12, sec. 4.2\].
 
 mod bounds;
 mod packed;
@@ -12,8 +12,8 @@ use crate::transfer::{Grouping, HistoryGroups, Historygram};
 use crate::volume::ValueBins;
 use bounds::Bounds;
 
-/// What a light path or an interaction on it depends on: values met in flight, whose opacity mattered, and values where light
-/// scattered, whose albedo and surfaces mattered. Both with all that came before on the path.
+/// What a light path or one of its vertices depends on: values read in flight, for their opacity, and values at scatterings,
+/// for their albedo and surfaces. Both accumulate along the path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Past {
     pub flight: Historygram,
@@ -67,22 +67,22 @@ impl Reading {
         self.groups.of(bins.bin(value))
     }
 
-    /// Goes on to a medium with other opacities; gives what flights are to be asked for beside the groups whose opacity
-    /// changed, see [`Bounds::moved`].
+    /// Updates to a medium with other opacities; returns what flights must be queried for in addition to the groups whose
+    /// opacity changed, see [`Bounds::moved`].
     pub fn update(&mut self, old: &Medium, new: &Medium) -> [Historygram; 2] {
         let moved = self.bounds.moved(old.majorants(), new.majorants());
         self.bounds = Bounds::new(&self.groups, &self.cells, new);
         moved
     }
 
-    /// Somebody who writes down what a path reads, after what it has read so far.
+    /// A recorder of what a path reads, starting from what it has read so far.
     #[inline(always)]
     pub fn writer<'a>(&'a self, medium: &'a Medium, past: Past) -> Writer<'a> {
         Writer { reading: self, bins: medium.transfer().bins(), past }
     }
 }
 
-/// Writes down what a path reads.
+/// Records what a path reads.
 #[derive(Debug)]
 pub(crate) struct Writer<'a> {
     reading: &'a Reading,

@@ -52,7 +52,7 @@ impl PackedHistories {
         self.words.extend_from_slice(&other.words[range.start * self.width..range.end * self.width]);
     }
 
-    /// Lets go of room that is not needed.
+    /// Releases memory that is not needed.
     pub fn shrink_to_fit(&mut self) {
         self.words.shrink_to_fit();
     }

@@ -1,20 +1,20 @@
-//! What an edit asks histories for.
+//! The query with which an edit tests histories.
 
 use super::Past;
 use crate::scene::{Difference, Scene};
 use crate::transfer::{BinSet, HistoryGroups, Historygram, TransferFunction};
 use crate::volume::ValueBins;
 
-/// What histories are asked for after an edit \[Jonsson12, sec. 4.2\], where it left volume, clips and random numbers alone.
+/// The query with which an edit tests histories \[Jonsson12, sec. 4.2\], if it left volume, clips and random numbers unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Touched {
-    /// Values whose change ends what paths have in common with new ones.
+    /// Values whose change makes a path diverge from the retraced one.
     pub paths: Past,
-    /// Values whose change shows in a view ray.
+    /// Values whose change is visible along a view ray.
     pub view: Historygram,
     /// Values that are or were matter.
     pub matter: Historygram,
-    /// Whether glowing matter starts its paths elsewhere.
+    /// Whether paths from glowing matter start at other positions.
     pub glow: bool,
 }
 
@@ -39,7 +39,7 @@ impl Touched {
         let scatter = scatter & matter;
         let glowing = bins_where(&|transfer, bin| transfer.emission_bound(around(transfer, bin)) > 0.0);
         let emission = groups.query(&transfer.emission);
-        // Cells are weighed by all that is in them, also by what does not glow.
+        // A cell's weight depends on everything in it, also on what does not glow.
         let positions = [old, new].map(|scene| scene.lights.emission());
         let moved = matches!(positions, [Some(old), Some(new)] if !old.same_cells(new));
         Self {
@@ -51,7 +51,7 @@ impl Touched {
     }
 }
 
-/// Values that surely hold those of a bin.
+/// An interval that certainly contains the values of a bin.
 pub(super) fn around(transfer: &TransferFunction, bin: usize) -> [f32; 2] {
     let bins = transfer.bins();
     let lo = if bin == 0 { f32::MIN } else { bins.value(bin as f32 - 0.01) };

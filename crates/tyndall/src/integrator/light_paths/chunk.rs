@@ -1,5 +1,5 @@
-//! Some hundred paths of one light that start near each other: traced together, so that they read the same matter, and
-//! traced again where an edit touched them.
+//! A chunk: up to 1024 paths of one light that start near each other. They are traced together, so that they read the same matter,
+//! and retraced where an edit touched them.
 
 use super::tracer::{LightPath, Resumed, Tracer, Vertex, Vertices, bounce_of};
 use super::{HistoryDetail, PathNumbers};
@@ -10,7 +10,7 @@ use crate::math::cast;
 use crate::simd::{Kernel, Lanes};
 use std::ops::Range;
 
-/// Paths in a chunk at most.
+/// Most paths in a chunk.
 pub(super) const PATHS: usize = 1024;
 
 /// Paths of one light, with their interactions and what both depend on.
@@ -22,7 +22,7 @@ pub(crate) struct Chunk<V> {
     traced: Traced<V>,
     /// What has changed since they were traced.
     changed: Past,
-    /// What is to take their place, when a stop came before all were traced again.
+    /// Their replacement, if a stop interrupted retracing.
     underway: Option<Box<Underway<V>>>,
 }
 
@@ -83,7 +83,7 @@ impl<V: Vertex> Traced<V> {
         self.ends.push(cast::fit_u32(self.vertices.stored.len()));
     }
 
-    /// Lets go of room that is not needed.
+    /// Releases memory that is not needed.
     fn shrink_to_fit(&mut self) {
         self.ends.shrink_to_fit();
         self.flight.shrink_to_fit();
@@ -113,7 +113,7 @@ impl<V: Vertex> Chunk<V> {
         self.traced.ends.len() == self.len()
     }
 
-    /// Whether all paths are as the scene would have them.
+    /// Whether all paths are up to date with the scene.
     pub fn is_valid(&self) -> bool {
         self.is_traced() && self.changed.is_empty()
     }
@@ -134,7 +134,7 @@ impl<V: Vertex> Chunk<V> {
         ChunkBytes { paths, vertices: vertices.bytes() }
     }
 
-    /// Paths that are other ones in another chunk of the same paths, or were not traced there.
+    /// Number of paths that differ from those of another chunk of the same path numbers, or were not traced there.
     pub fn differing(&self, other: &Self) -> usize {
         let vertices = |chunk: &Self, path| {
             bytemuck::cast_slice::<_, u8>(&chunk.vertices()[chunk.traced.range(path)]).to_vec()
@@ -149,8 +149,7 @@ impl<V: Vertex> Chunk<V> {
     }
 }
 
-/// Traces the paths of a chunk that are not valid, each on from its last valid interaction, unless a stop comes first; gives
-/// how many.
+/// Retraces the invalid paths of a chunk, each from its last valid vertex on, until a stop; returns how many were traced.
 pub(super) struct Update<'a, V> {
     pub chunk: &'a mut Chunk<V>,
     pub tracer: Tracer<'a>,

@@ -30,7 +30,7 @@ pub(crate) struct LightPaths<V> {
     /// Tells its random numbers from those of other lights.
     pub stream: u32,
     pub chunks: Vec<Chunk<V>>,
-    /// Paths, also those that missed.
+    /// Number of paths started, including those that missed.
     pub count: u32,
 }
 

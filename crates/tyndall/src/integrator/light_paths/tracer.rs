@@ -35,21 +35,21 @@ pub(crate) struct Arrival {
     pub flux: Rgb,
 }
 
-/// So many interactions of a path are all kept, and of the later ones fewer and fewer, with the flux of those left out: the
-/// light of long paths is spread so widely that more would cost memory and no noise.
+/// The first vertices of a path are all stored, later ones with falling probability, carrying the flux of those left out: light
+/// of long paths is spread so widely that storing all of it would cost memory without reducing noise.
 const WHOLE: u32 = 4;
 
-/// Chance of an interaction being kept, by the scatterings before it.
+/// Probability that a vertex is stored, by the number of scatterings before it.
 fn chance(bounce: u32) -> f32 {
     WHOLE as f32 / (bounce + 1).max(WHOLE) as f32
 }
 
-/// Whether a path keeps its interaction after so many scatterings.
+/// Whether a path stores its vertex after so many scatterings.
 fn is_kept(numbers: &LightPathSampler, bounce: u32) -> bool {
     numbers.bounce(bounce).light_choice < chance(bounce)
 }
 
-/// Scatterings before the interaction of a path that it keeps after so many others.
+/// Number of scatterings before the `kept`-th stored vertex of a path.
 pub(super) fn bounce_of(numbers: &LightPathSampler, kept: usize) -> u32 {
     let mut bounces = (0..).filter(|&bounce| is_kept(numbers, bounce));
     bounces.nth(kept).unwrap_or(u32::MAX)
@@ -183,8 +183,8 @@ impl Tracer<'_> {
         LightPath { flight, past }
     }
 
-    /// Goes on to the path's end, or for one scattering at least when told to stop; gives whether it has ended. Then the path's
-    /// past is what the whole path depends on: also what it did not hit.
+    /// Continues to the path's end, or until a stop, but for at least one scattering; returns whether the path has ended. Its past
+    /// then is what the whole path depends on, including matter that it passed without a collision.
     #[inline(always)]
     pub fn go_on<V: Vertex>(
         &self,
@@ -218,7 +218,7 @@ impl Tracer<'_> {
         Some(Flight { ray: emitted.ray, flux: emitted.flux, bounce: 0 })
     }
 
-    /// To where light interacts next \[Jonsson12, eq. 6\], by tracking: without bias, and cheaper than to march.
+    /// Flies to the next interaction \[Jonsson12, eq. 6\] by delta tracking: unbiased, and cheaper than marching.
     #[inline(always)]
     fn fly<V: Vertex>(&self, flight: &Flight, numbers: &LightPathSampler, past: &mut Past) -> Option<V> {
         let track = self.medium().track(&flight.ray, f32::INFINITY);
@@ -235,8 +235,8 @@ impl Tracer<'_> {
         }))
     }
 
-    /// Scatters light on, or takes it away \[Jonsson12, eq. 7\]: it survives with the chance that its brightest channel
-    /// does, which depends on the position alone and not on what the path carries, so that no channel's light ends another's.
+    /// Scatters or absorbs the light \[Jonsson12, eq. 7\]: it survives with the albedo of its brightest channel, which depends on
+    /// the position alone and not on the path's flux, so that a black channel does not end the others.
     #[inline(always)]
     fn scatter<V: Vertex>(
         &self,

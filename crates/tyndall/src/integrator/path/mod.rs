@@ -1,9 +1,9 @@
 //! Unbiased Monte Carlo: one path from the camera per sample, by the scheme of Exposure Render as
 //! \[Khlebnikov14, sec. 3\] tells it, extended to any order of scattering.
 //!
-//! A path flies to a collision, asks one light for what it sends there, scatters, and flies on. Light
-//! found by the two ways is weighed by the balance heuristic \[Veach97\]. Paths have any length and no stack.
-//! A session that is to be edited keeps samples with what they depend on, so that an edit takes again those alone that it
+//! A path flies to a collision, samples one light there, scatters, and flies on. Light
+//! found both ways is weighted by the balance heuristic \[Veach97\]. Paths have any length and no stack.
+//! A session that is to be edited keeps samples with what they depend on, so that an edit retakes only those that it
 //! touched.
 
 mod samples;
@@ -25,7 +25,7 @@ use samples::{SampleCounts, SampleKeeper, SampleTile};
 use std::any::Any;
 use tracer::{CameraPath, TraceOne, TracePixels};
 
-/// The path tracer. If it may keep samples, an edit takes again those alone that it touched.
+/// The path tracer. With memory for samples, an edit retakes only those that it touched.
 #[derive(Debug)]
 pub struct PathTracer {
     level: Level,

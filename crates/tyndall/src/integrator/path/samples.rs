@@ -1,5 +1,5 @@
-//! Samples that survive edits \[Jonsson12, sec. 7\]: each is kept with what it depends on, and only those that an edit touched
-//! are taken again.
+//! Samples that survive edits \[Jonsson12, sec. 7\]: each is kept with its histories, and only those that an edit touched are
+//! retaken.
 
 use crate::film::{PixelSample, Tile};
 use crate::integrator::history::{PackedHistories, Past, Reading, Touched};
@@ -42,7 +42,7 @@ impl SampleKeeper {
         next < self.most * tile.pixel_count() && next <= kept.samples.len()
     }
 
-    /// What an edit asks the samples for; `None` where all are to be taken anew.
+    /// The query for the kept samples after an edit; `None` if all must be retaken.
     pub fn update(&mut self, edit: &Edited) -> Option<SampleQuery> {
         let Edited { old, new, difference } = *edit;
         let Difference { volume, majorants, clip, seed, camera, size, .. } = *difference;
@@ -57,7 +57,7 @@ impl SampleKeeper {
         }
         let lights = !difference.lights.is_empty();
         if lights || touched.glow {
-            // All that scatters asks one of all lights, by their power.
+            // Every scattering samples one of all lights, chosen by power.
             past.scatter = touched.matter;
         }
         let shows_sky = |scene: &Scene| scene.background == Background::Environment && scene.lights.has_sky();
@@ -78,9 +78,9 @@ pub(super) struct SampleQuery {
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 struct KeptSample {
-    /// The first is no number where the sample is to be taken again.
+    /// The first is NaN where the sample must be retaken.
     radiance: [f32; 3],
-    /// No number where no matter was met.
+    /// NaN where no matter was met.
     depth: f32,
 }
 

@@ -12,8 +12,7 @@ use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes};
 use std::ops::ControlFlow;
 
-/// A path whose throughput falls below this lives on by chance: at 1 every path does, with the share of light that it
-/// still carries. Against 1/4 this makes the same error in 0.75 (coloured cloud) to 1.02 (white cloud) of the time.
+/// Russian roulette begins below this throughput; at 1 every path survives with its throughput as probability. Against 1/4 this makes the same error in 0.75 (coloured cloud) to 1.02 (white cloud) of the time.
 const ROULETTE_WEIGHT: f32 = 1.0;
 
 /// Adds one path to every pixel of a tile until each has so many samples, unless a stop comes first.
@@ -66,13 +65,13 @@ impl Kernel for TracePixels<'_> {
     }
 }
 
-/// What hears of all that a path reads.
+/// Listener to all that a path reads.
 trait PathNotes: FlightNotes {
     /// The optics of a value where light scatters.
     fn scatters(&mut self, value: f32);
 }
 
-/// Nobody listens.
+/// No listener.
 impl PathNotes for () {
     #[inline(always)]
     fn scatters(&mut self, _: f32) {}
@@ -159,7 +158,8 @@ impl CameraPath {
             return ControlFlow::Break(());
         };
         let optics = medium.transfer().optics(collision.value);
-        // Where the path ends only the glow is read, by which lights are drawn: other than at once, such a path asked a light.
+        // At the last order only emission is read. It decides how lights are chosen, and a path of any scattering has already
+        // sampled one, so that its history holds that dependence; only an order-0 path has not.
         if *order < scene.render.max_scatter || *order == 0 {
             notes.scatters(collision.value);
         }

@@ -1,4 +1,4 @@
-//! What of light paths, photons and segments an edit leaves valid.
+//! Which light paths, photons and segments an edit leaves valid.
 
 use super::stored::Photon;
 use super::{PhotonMapper, SegmentTile, marks_for, plan, step};
@@ -17,7 +17,7 @@ impl PhotonMapper {
         }
         let mut touched = Touched::new(&self.ground.reading.groups, old, new, difference);
         if !difference.transfer.opacity.is_empty() {
-            // Light paths do not read what is smallest.
+            // Light paths do not read a cell's smallest opacity.
             let [_, raised] = self.ground.reading.update(&old.medium, &new.medium);
             touched.paths.flight |= raised;
         }
@@ -49,7 +49,7 @@ impl PhotonMapper {
         true
     }
 
-    /// Keeps the paths of lights that send the same ones, wherever they are now among the lights.
+    /// Keeps the paths of lights that still send the same ones, whatever their index is now.
     fn update_lights(&mut self, scene: &Scene, glow: bool) {
         let sources = sources(scene);
         let plan = plan(scene, &self.settings, sources.len());

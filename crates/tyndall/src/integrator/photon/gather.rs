@@ -1,4 +1,4 @@
-//! What photons tell about the light at a position \[Jonsson12, eq. 8\].
+//! The radiance estimate from photons around a position \[Jonsson12, eq. 8\].
 
 use super::kernel::{Ball, GatherRegion, Slice};
 use super::map::PhotonMap;
@@ -12,12 +12,12 @@ use fearless_simd::prelude::*;
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
 
-/// Where light is gathered, and for whom.
+/// A gather: where, and towards which viewer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gathering {
     /// Index space.
     pub position: Vec3,
-    /// Opacity there; positive but for rounding.
+    /// Opacity there; positive up to rounding.
     pub opacity: f32,
     pub event: Event,
     /// Towards the viewer.
@@ -29,8 +29,8 @@ pub(super) struct Gathering {
 }
 
 impl PhotonMap {
-    /// Light from everywhere that a position scatters to a viewer, per unit extinction. `notes` hears of the values that are
-    /// read about the position.
+    /// Light from everywhere that a position scatters to a viewer, per unit extinction. `notes` is told of the values that are
+    /// read around the position.
     #[inline(always)]
     pub fn scattered<S: Lanes>(
         &self,
@@ -54,7 +54,7 @@ impl PhotonMap {
         }
     }
 
-    /// The estimate over a part of space.
+    /// The estimate over a region.
     #[inline(always)]
     fn within<S: Lanes, R: GatherRegion>(
         &self,
@@ -99,7 +99,7 @@ impl PhotonMap {
             }
         }
         let light = sum.total() / (kernel.volume() * matter.opacity);
-        // Matter so thin that single precision holds no such quotient shows nothing.
+        // In matter this thin the quotient overflows single precision, and nothing is visible.
         if light.to_array().iter().all(|x| x.is_finite()) { light } else { Rgb::BLACK }
     }
 
@@ -147,7 +147,7 @@ fn number_of(position: Vec3) -> usize {
 /// Optical depth within which fluence falls about as its linear fit does.
 const MOST_THICK: f32 = 1.5;
 
-/// At a skin matter leans by so much of the radius, or more.
+/// At a boundary of matter its mean position is off by at least this share of the radius.
 const LEAN_OF_SKIN: f32 = 0.1;
 
 /// Along which axis a gather is to be flattened, and to what share of its radius: at the skin of matter so dense that little

@@ -1,4 +1,4 @@
-//! Over which part of space a gather takes photons together; lengths in units of the map's radius.
+//! The regions over which a gather collects photons; lengths in units of the map's radius.
 
 use crate::math::{Frame, Mat3, Vec3};
 use crate::medium::MOST_LANES;
@@ -6,7 +6,7 @@ use crate::simd::Lanes;
 use fearless_simd::prelude::*;
 use std::f32::consts::PI;
 
-/// A part of metric space about a position.
+/// A region of metric space around a position.
 pub(super) trait GatherRegion: Copy {
     /// How far it reaches where it is not flattened: all round, or about a ray.
     fn radius(&self) -> f32;

@@ -22,17 +22,17 @@ const MOST_LEAN: f32 = 0.75;
 /// inverse.
 const LEAST_SPREAD: f32 = 0.02;
 
-/// Matter thinner than this scatters nothing that single precision tells.
+/// Matter thinner than this scatters nothing that single precision can represent.
 const LEAST_OPACITY: f32 = 1e-30;
 
-/// What a fit by moments makes of photons.
+/// Weights of photons by the fit to moments.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Matter {
     /// Opacity by which the weighted flux is to be divided.
     pub opacity: f32,
     /// A photon's weight falls by so much per radius.
     pub slope: Vec3,
-    /// The mean of its positions relative to the query's, metric: to where it leans.
+    /// Mean position of matter relative to the query, in metric space.
     pub lean: Vec3,
 }
 

@@ -42,7 +42,7 @@ use std::any::Any;
 use stored::Photon;
 use view::View;
 
-/// Light paths, photons, and what is known about edits since; the segments lie with their tiles.
+/// Light paths, photons, and what edits changed since; segments are kept with their tiles.
 #[derive(Debug)]
 pub struct PhotonMapper {
     settings: Settings,
@@ -182,8 +182,7 @@ impl Method for PhotonMapper {
         tiles.iter_mut().flatten().for_each(|tile| tile.computed = SegmentCounts::default());
     }
 
-    /// Makes the photons ready from which a sample is to be taken, those of the base map for the first; false where a stop
-    /// came before.
+    /// Prepares the photons for a sample, those of the base map for the first; false if a stop came first.
     fn prepare(&mut self, scene: &Scene, sample: u32, limits: &Limits) -> bool {
         if scene.render.max_scatter == 0 {
             return true;
@@ -282,8 +281,8 @@ fn plan(scene: &Scene, settings: &Settings, sources: usize) -> Plan {
     }
 }
 
-/// Step of a view ray, world units: so short that little light is lost in the densest matter within one, since light and
-/// view then change as fast; but not without end.
+/// Step of a view ray in world units: short enough that attenuation within a step of the densest matter is small, with a lower
+/// bound.
 fn step(scene: &Scene, settings: &Settings) -> f32 {
     const THICKEST: f32 = 0.5;
     const SHORTEST: f32 = 1.0 / 16.0;
@@ -303,12 +302,12 @@ fn cells_for(scene: &Scene, settings: &Settings, radius: f32) -> CellGrid {
     CellGrid::new(grid, radius, reach)
 }
 
-/// Where photons will change, in the map's own cells: photons are added up in the order of whole cells, so that one beside a
-/// gather moves its last bit.
+/// Marks of changed photons, in the map's own cells: a gather sums photons cell by cell, so that even a photon outside its radius
+/// can change its last bit.
 fn marks_for(scene: &Scene, settings: &Settings) -> ChangeMarks {
     let medium = &*scene.medium;
     let grid = cells_for(scene, settings, settings.radius);
-    // When so many photons have changed, few segments are left that gather none of them.
+    // Past this number of changed photons, few segments gather none of them.
     let enough = settings.photons as usize / 2;
     match settings.spatial {
         SpatialHistory::Off => ChangeMarks::off(),

@@ -24,7 +24,7 @@ pub(super) struct Pass {
     pub map: Option<PhotonMap>,
 }
 
-/// How much of each pass's variance stays; between 0 and 1, here what \[Knaus11\] found best.
+/// Trade-off between variance and bias of successive passes, between 0 and 1: the value that \[Knaus11\] found best.
 const ALPHA: f64 = 2.0 / 3.0;
 
 /// Radius of a pass over that of the base map: volumes shrink as `(i + alpha) / (i + 1)` \[Knaus11\].
@@ -36,7 +36,7 @@ fn shrunk(pass: u32) -> f32 {
 impl Pass {
     pub fn new(scene: &Scene, settings: &Settings, number: u32) -> Self {
         let sources = sources(scene);
-        // Nothing of a pass lives through an edit.
+        // No pass survives an edit.
         let plan =
             Plan { histories: HistoryDetail::Paths, pass: number, ..plan(scene, settings, sources.len()) };
         let lights = sources.into_iter().map(|source| LightPaths::new(source, &plan)).collect();

@@ -49,7 +49,7 @@ struct Segment {
 /// Bytes of a segment without its Historygram.
 pub(super) const BYTES: u64 = size_of::<Segment>() as u64;
 
-/// What stands for 1; the number after it is free.
+/// The code for 1; the code after it means unknown.
 const WHOLE: u16 = u16::MAX - 1;
 
 impl Segment {
@@ -124,7 +124,7 @@ impl SegmentTile {
         changes
     }
 
-    /// What values an edit changed; photons may have changed anywhere.
+    /// Notes which values an edit changed; photons may have changed anywhere.
     pub fn add_change(&mut self, values: Historygram) {
         self.changed = Some(self.changed.unwrap_or_default() | values);
         self.computed = SegmentCounts::default();
@@ -242,7 +242,7 @@ fn forget_near(view: &View, pixel: [u32; 2], positions: &ChangeMarks, segments: 
         if cell.most <= 0.0 || !positions.near_cell(cell.cell) {
             continue;
         }
-        // A step more to either side, whatever rounding says about the border.
+        // One step more on either side, since the border is subject to rounding.
         let first = cast::truncate(cell.start / view.step - 1.5).max(0);
         let last = cast::truncate(cell.end / view.step + 0.5).min(count - 1);
         for k in first..=last {

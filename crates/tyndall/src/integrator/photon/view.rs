@@ -1,4 +1,4 @@
-//! Rays from the camera through matter that photons light \[Jonsson12, eq. 2\]: stretches of rays, a packet at a time.
+//! View rays through matter lit by photons \[Jonsson12, eq. 2\]: packets of ray segments.
 
 use super::gather::Gathering;
 use super::map::PhotonMap;
@@ -11,11 +11,11 @@ use crate::transfer::{HistoryGroups, Historygram};
 use crate::volume::ValueBins;
 use fearless_simd::prelude::*;
 
-/// What a ray covers between two gathers at most, unless they lie as far apart as the settings allow: so little shows that one
-/// stands for all of it.
+/// Most opacity that a ray accumulates between two gathers, unless the spacing of the settings is reached first: so little that one
+/// gather represents all of it.
 const MOST_COVERED: f32 = 1.0 / 16.0;
 
-/// What viewing reads.
+/// Inputs of viewing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View<'a> {
     pub scene: &'a Scene,
@@ -35,7 +35,7 @@ pub(super) struct Stretches {
     /// First step and the one after the last; lanes without a stretch have none.
     pub from: [i32; MOST_LANES],
     pub to: [i32; MOST_LANES],
-    /// Share of a gather that is due at the beginning, below 1. Evenly spread over rays they leave no bias.
+    /// Fraction of a gather due at the beginning, below 1. Spread evenly over rays, these fractions cause no bias.
     pub due: [f32; MOST_LANES],
 }
 
@@ -58,7 +58,7 @@ pub(super) struct Stretch {
     pub transmittance: f32,
     /// Sum of the distances inside the medium, weighted by what they cover.
     pub depth: f32,
-    /// Places of it where photons were gathered.
+    /// Number of gathers on it.
     pub gathers: usize,
 }
 
@@ -181,7 +181,7 @@ struct ViewSample {
     lane: usize,
 }
 
-/// Writes down what each lane's stretch reads.
+/// Records what each lane's ray segment reads.
 pub(super) struct Notes<'a> {
     pub groups: &'a HistoryGroups,
     pub bins: ValueBins,

@@ -112,7 +112,7 @@ struct DirectShader<'a> {
     scene: &'a Scene,
     packet: &'a mut Packet,
     stop: &'a Stop<'a>,
-    /// Whether a point has been shaded since the march went on, so that it gets on however often it is told to stop.
+    /// Whether a point has been shaded since the march resumed, so that it makes progress however often it is stopped.
     moved: bool,
 }
 

@@ -42,7 +42,7 @@ impl Method for RayMarch {
     }
 
     fn is_touched_by(&self, difference: &Difference) -> bool {
-        // Cells decide in which order a march adds up what it meets.
+        // Cells decide in which order a march sums its samples.
         difference.view() || difference.light() || difference.majorants
     }
 

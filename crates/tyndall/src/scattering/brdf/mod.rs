@@ -12,7 +12,7 @@ pub use abc::{Abc, BrdfError};
 
 use crate::math::{Frame, Rgb, Vec3};
 use crate::sampling::warp;
-use crate::scattering::{Walk, deflect};
+use crate::scattering::{TransportMode, deflect};
 use ashikhmin_shirley::AshikhminShirley;
 use coat::Half;
 use std::f32::consts::{FRAC_1_PI, TAU};
@@ -40,7 +40,7 @@ pub enum Brdf {
     Abc(Abc),
 }
 
-/// How much light the lobes of a BRDF turn a walk's way, roughly: what sampling chooses by.
+/// Roughly how much light each lobe of a BRDF reflects: the weights by which sampling chooses a lobe.
 #[derive(Clone, Copy, Default)]
 struct Lobes {
     diffuse: f32,
@@ -82,11 +82,18 @@ impl Brdf {
     /// Draws the direction that a walk does not know yet; `None` where it would go below the surface,
     /// which is light lost to it.
     ///
-    /// `known` is `w_out` of a camera walk, which draws `w_in` about by `f_r cos_in`, and `w_in` of a light
+    /// `known` is `w_out` of a camera path, which draws `w_in` about by `f_r cos_in`, and `w_in` of a light
     /// walk, which draws `w_out` about by `f_r`. `u` are uniform numbers in [0, 1]; the last one chooses the lobe.
     #[inline]
     #[must_use]
-    pub fn sample(&self, walk: Walk, n: Vec3, known: Vec3, surface: &Surface, u: [f32; 3]) -> Option<Vec3> {
+    pub fn sample(
+        &self,
+        walk: TransportMode,
+        n: Vec3,
+        known: Vec3,
+        surface: &Surface,
+        u: [f32; 3],
+    ) -> Option<Vec3> {
         let n = n * 1.0_f32.copysign(n.dot(known));
         let lobes = self.lobes(walk, n.dot(known), surface);
         if lobes.total() <= 0.0 {
@@ -102,7 +109,7 @@ impl Brdf {
     /// short of 1 by the chance of `None`.
     #[inline]
     #[must_use]
-    pub fn pdf(&self, walk: Walk, n: Vec3, known: Vec3, drawn: Vec3, surface: &Surface) -> f32 {
+    pub fn pdf(&self, walk: TransportMode, n: Vec3, known: Vec3, drawn: Vec3, surface: &Surface) -> f32 {
         let Some((n, cos_known, cos_drawn)) = one_side(n, known, drawn) else {
             return 0.0;
         };
@@ -122,19 +129,19 @@ impl Brdf {
     /// [`Self::eval`] is not.
     #[inline]
     #[must_use]
-    pub fn reflectance_estimate(&self, walk: Walk, cos_known: f32, surface: &Surface) -> f32 {
+    pub fn reflectance_estimate(&self, walk: TransportMode, cos_known: f32, surface: &Surface) -> f32 {
         self.lobes(walk, cos_known, surface).total()
     }
 
     /// What each lobe reflects, roughly, seen from the known direction: the largest channel, so that no
     /// colour is drawn too rarely.
     #[inline]
-    fn lobes(&self, walk: Walk, cos_known: f32, surface: &Surface) -> Lobes {
+    fn lobes(&self, walk: TransportMode, cos_known: f32, surface: &Surface) -> Lobes {
         if cos_known <= 0.0 {
             return Lobes::default();
         }
-        // A light walk keeps the known cosine, a camera walk integrates over the other one.
-        let kept = if walk == Walk::Light { 2.0 * cos_known } else { 1.0 };
+        // A light path keeps the known cosine, a camera path integrates over the other one.
+        let kept = if walk == TransportMode::Light { 2.0 * cos_known } else { 1.0 };
         match self {
             Self::Lambert => Lobes { diffuse: kept * surface.albedo.max_component(), specular: 0.0 },
             Self::AshikhminShirley | Self::Abc(_) => Lobes {
@@ -158,24 +165,24 @@ impl Brdf {
     }
 }
 
-/// Draws from the diffuse lobe about `n`. In a camera walk the cosine belongs to the drawn direction and
-/// is sampled with it; in a light walk it belongs to the known one, and the drawn one is uniform:
+/// Draws from the diffuse lobe about `n`. In a camera path the cosine belongs to the drawn direction and
+/// is sampled with it; in a light path it belongs to the known one, and the drawn one is uniform:
 /// dividing by a drawn cosine would leave weights without a bound.
 #[inline]
-fn draw_diffuse(walk: Walk, n: Vec3, u: [f32; 2]) -> Vec3 {
+fn draw_diffuse(walk: TransportMode, n: Vec3, u: [f32; 2]) -> Vec3 {
     let local = match walk {
-        Walk::Camera => warp::cosine_hemisphere(u),
-        Walk::Light => warp::around_z(1.0 - u[0], u[1]),
+        TransportMode::Camera => warp::cosine_hemisphere(u),
+        TransportMode::Light => warp::around_z(1.0 - u[0], u[1]),
     };
     Frame::around(n).to_world(local)
 }
 
 /// Density of [`draw_diffuse`], \[1/sr\].
 #[inline]
-fn diffuse_density(walk: Walk, cos_drawn: f32) -> f32 {
+fn diffuse_density(walk: TransportMode, cos_drawn: f32) -> f32 {
     match walk {
-        Walk::Camera => cos_drawn * FRAC_1_PI,
-        Walk::Light => 1.0 / TAU,
+        TransportMode::Camera => cos_drawn * FRAC_1_PI,
+        TransportMode::Light => 1.0 / TAU,
     }
 }
 

@@ -132,11 +132,11 @@ fn nothing_passes_through_or_along_a_surface() {
         let surface = grey(0.9, 0.9, roughness);
         for (w_in, w_out) in [(Vec3::Z, -Vec3::Z), (Vec3::Z, along), (along, Vec3::Z), (along, -along)] {
             assert!(brdf.eval(Vec3::Z, w_in, w_out, &surface).is_black(), "{brdf:?} {w_in} {w_out}");
-            for walk in [Walk::Camera, Walk::Light] {
+            for walk in [TransportMode::Camera, TransportMode::Light] {
                 assert_eq!(brdf.pdf(walk, Vec3::Z, w_out, w_in, &surface), 0.0, "{brdf:?} {w_in} {w_out}");
             }
         }
-        assert_eq!(brdf.sample(Walk::Camera, Vec3::Z, along, &surface, [0.3, 0.3, 0.3]), None);
+        assert_eq!(brdf.sample(TransportMode::Camera, Vec3::Z, along, &surface, [0.3, 0.3, 0.3]), None);
     }
 }
 
@@ -160,7 +160,7 @@ fn trials() -> Vec<(Brdf, Surface, f32)> {
 #[test]
 fn samplers_follow_their_densities() {
     let trials = trials();
-    for walk in [Walk::Camera, Walk::Light] {
+    for walk in [TransportMode::Camera, TransportMode::Light] {
         for (brdf, surface, degrees) in &trials {
             // The mirror direction is the pole of the cells, which finds lobes however narrow.
             let n = deflect(Vec3::Z, 1.0 - degrees.to_radians().cos(), 0.1);
