@@ -8,6 +8,7 @@ use crate::integrator::history::Reading;
 use crate::light::{Enclosure, Light};
 use crate::math::{Rgb, cast};
 use crate::sampling::LightPathSampler;
+use crate::sampling::address::Emitter;
 use crate::scene::{Histories, PhotonSettings, Scene};
 use crate::simd::Level;
 use rayon::prelude::*;
@@ -58,9 +59,6 @@ impl Plan {
     }
 }
 
-/// The stream of glowing matter's random numbers.
-const MATTER: u32 = u32::MAX;
-
 /// A scene's lights and its glowing matter, with the streams of their random numbers: by name where a light has one, so that
 /// it keeps them when others come and go; else by its number. In the order of the streams, in which photons are added up too.
 pub(super) fn sources(scene: &Scene) -> Vec<(Option<Light>, u32)> {
@@ -75,11 +73,11 @@ pub(super) fn sources(scene: &Scene) -> Vec<(Option<Light>, u32)> {
         Some(name) if first_of[name.as_str()] == i => {
             let mut hasher = DefaultHasher::new();
             name.hash(&mut hasher);
-            cast::low_u32(hasher.finish()) | 1 << 31
+            Emitter::Named { hash: cast::low_u32(hasher.finish()) }.number()
         }
-        _ => cast::fit_u32(i),
+        _ => Emitter::Unnamed { index: cast::fit_u32(i) }.number(),
     };
-    let matter = scene.lights.emission().map(|_| (None, MATTER));
+    let matter = scene.lights.emission().map(|_| (None, Emitter::Matter.number()));
     let mut sources: Vec<_> =
         (0..lights.len()).map(|i| (Some(lights[i].clone()), stream(i))).chain(matter).collect();
     sources.sort_by_key(|source| source.1);

@@ -7,7 +7,7 @@ use super::spatial::Changed;
 use super::view::{Stretches, View};
 use crate::film::{PixelSample, Tile};
 use crate::integrator::Stop;
-use crate::sampling::Stream;
+use crate::sampling::address::Purpose;
 use crate::scene::{Histories, PhotonSettings, Scene};
 use crate::simd::{Kernel, Lanes};
 use std::sync::atomic::AtomicUsize;
@@ -80,7 +80,8 @@ impl Kernel for Refine<'_> {
             let (pixels, sample) = tile.next(S::WIDTH);
             let count = pixels.len();
             for (lane, [x, y]) in pixels.enumerate() {
-                let mut stream = Stream::new(scene.render.seed, [y * scene.size[0] + x, sample, u32::MAX]);
+                let pixel = y * scene.size[0] + x;
+                let mut stream = Purpose::ViewRay { pixel, sample }.stream(scene.render.seed);
                 let [in_x, in_y, u, v, within, due] = [(); 6].map(|()| stream.uniform());
                 let ray = scene.camera.ray(scene.size, [x as f32 + in_x, y as f32 + in_y], [u, v]);
                 let track = scene.medium.track(&ray, f32::INFINITY).shifted((within - 0.5) * view.step);

@@ -206,7 +206,7 @@ impl Tracer<'_> {
         let u = numbers.emission();
         let emitted = match self.source {
             Source::Light(light) => light.emit(self.enclosure, u),
-            Source::Matter(glow) => glow.emit(self.medium(), u, &mut numbers.stream(u32::MAX)),
+            Source::Matter(glow) => glow.emit(self.medium(), u, &mut numbers.matter_emission()),
         }?;
         Some(Flight { ray: emitted.ray, flux: emitted.flux, bounce: 0 })
     }
