@@ -139,3 +139,18 @@ fn the_renderer_knows_no_file_and_no_window() {
         }
     }
 }
+
+/// Who writes counters by hand may draw what others draw.
+#[test]
+fn addresses_of_random_numbers_come_from_one_table() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let drawn_in = ["address.rs", "philox.rs", "stream.rs"].map(|file| root.join("sampling").join(file));
+    for path in sources(&root).iter().filter(|path| !drawn_in.contains(path) && !path.ends_with("tests.rs")) {
+        let text = fs::read_to_string(path).unwrap();
+        let code = text.split("#[cfg(test)]").next().unwrap();
+        for word in ["Stream::new(", "Stream::at(", "philox("] {
+            assert!(!code.contains(word), "{}: {word}", path.display());
+        }
+    }
+    assert!(drawn_in.iter().all(|path| path.exists()));
+}

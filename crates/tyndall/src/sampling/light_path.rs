@@ -1,29 +1,27 @@
 //! The numbers of one light path: each follows from seed, pass, light, path, bounce and dimension alone, so that a path that
 //! is traced again, from its beginning or from any scattering on, draws the same.
 
+use super::Stream;
+use super::address::Purpose;
 use super::sampler::{BounceSample, SEQUENCE, SOBOL_BOUNCES};
-use super::{Stream, philox};
-use crate::math::cast;
 use sobol_burley::sample_4d;
 
 /// Owen-scrambled Sobol points \[Burley20\] over the paths of a light, and a [`Stream`] per flight.
 #[derive(Clone, Copy, Debug)]
 pub struct LightPathSampler {
     seed: u64,
-    light: u32,
+    pass: u32,
+    emitter: u32,
     path: u32,
     scramble: u32,
 }
 
 impl LightPathSampler {
-    /// The numbers of a light's `path`-th path in a pass; paths of other passes and lights draw independently.
+    /// The numbers of an emitter's `path`-th path in a pass; paths of other passes and emitters draw independently.
     #[must_use]
-    pub fn new(seed: u64, pass: u32, light: u32, path: u32) -> Self {
-        // The golden ratio spreads passes over all seeds; the first pass has the seed itself.
-        let seed = seed.wrapping_add(u64::from(pass).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-        let key = [cast::low_u32(seed), cast::low_u32(seed >> 32)];
-        let [scramble, ..] = philox([light, path / SEQUENCE, 0, 2], key);
-        Self { seed, light, path, scramble }
+    pub fn new(seed: u64, pass: u32, emitter: u32, path: u32) -> Self {
+        let scramble = Purpose::LightScramble { pass, emitter, sequence: path / SEQUENCE }.bits(seed);
+        Self { seed, pass, emitter, path, scramble }
     }
 
     /// Paths among which the numbers of one dimension are spread evenly.
@@ -42,8 +40,8 @@ impl LightPathSampler {
         let [a, b] = if bounce < SOBOL_BOUNCES {
             [1, 2].map(|k| sample_4d(self.path % SEQUENCE, k + 2 * bounce, self.scramble))
         } else {
-            // A stream apart from the flight's, whose draws have no fixed number.
-            let mut stream = self.stream(bounce | 1 << 31);
+            let Self { seed, pass, emitter, path, .. } = *self;
+            let mut stream = Purpose::LightLateBounce { pass, emitter, path, bounce }.stream(seed);
             [(); 2].map(|()| [(); 4].map(|()| stream.uniform()))
         };
         BounceSample::of(a, b)
@@ -53,13 +51,21 @@ impl LightPathSampler {
     #[inline]
     #[must_use]
     pub fn stream(&self, bounce: u32) -> Stream {
-        Stream::new(self.seed, [self.light, self.path, bounce])
+        let Self { seed, pass, emitter, path, .. } = *self;
+        Purpose::LightTracking { pass, emitter, path, bounce }.stream(seed)
+    }
+
+    /// Numbers for where in a glowing cell the path begins.
+    #[must_use]
+    pub fn matter_emission(&self) -> Stream {
+        Purpose::MatterEmission { pass: self.pass, path: self.path }.stream(self.seed)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::cast;
 
     #[test]
     fn numbers_follow_from_the_address_alone() {

@@ -3,6 +3,7 @@
 //! Every number comes from a counter, never from shared state: a path that is traced again draws the
 //! same numbers, on any thread.
 
+pub(crate) mod address;
 mod discrete;
 mod light_path;
 mod philox;
@@ -10,6 +11,7 @@ mod sampler;
 mod stream;
 pub mod warp;
 
+pub use address::{BOUNCES, PATHS, PIXELS};
 pub use discrete::{Choice, Discrete};
 pub use light_path::LightPathSampler;
 pub use philox::philox;

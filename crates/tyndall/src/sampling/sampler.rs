@@ -1,7 +1,8 @@
 //! The numbers of one camera path: low discrepancy for its first bounces, a random stream after.
 
+use super::Stream;
+use super::address::Purpose;
 use super::stream::exponential;
-use super::{Stream, philox};
 use sobol_burley::sample_4d;
 
 /// Bounces that draw from the Sobol sequence; past these a better spread no longer pays.
@@ -59,8 +60,8 @@ impl PathSampler {
     /// The numbers of a pixel's `sample`-th path.
     #[must_use]
     pub fn new(seed: u64, pixel: u32, sample: u32) -> Self {
-        let stream = Stream::new(seed, [pixel, sample, 0]);
-        let [scramble, ..] = philox([pixel, sample / SEQUENCE, 0, 1], stream.key);
+        let scramble = Purpose::CameraScramble { pixel, sequence: sample / SEQUENCE }.bits(seed);
+        let stream = Purpose::CameraTracking { pixel, sample }.stream(seed);
         Self { index: sample % SEQUENCE, scramble, stream }
     }
 

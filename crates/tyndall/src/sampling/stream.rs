@@ -1,23 +1,27 @@
 //! A stream of independent random numbers addressed by a counter.
 
-use super::philox;
+use super::{address, philox};
 
-/// Uniform numbers for one (seed, domain, index, sample); two streams with different addresses never meet.
+/// Uniform numbers of one address under a seed; two streams with different addresses never meet.
 #[derive(Clone, Debug)]
 pub struct Stream {
     pub(super) key: [u32; 2],
     /// Block number, then the address.
-    counter: [u32; 4],
+    pub(super) counter: [u32; 4],
     block: [u32; 4],
     left: usize,
 }
 
 impl Stream {
-    /// The stream of `[a, b, c]` (say pixel, sample, purpose) under a seed.
+    /// The stream of `[a, b, c]` under a seed: for numbers beside a picture. Those in it may have the same address.
     #[must_use]
     pub fn new(seed: u64, [a, b, c]: [u32; 3]) -> Self {
-        let key = [crate::math::cast::low_u32(seed), crate::math::cast::low_u32(seed >> 32)];
-        Self { key, counter: [0, a, b, c], block: [0; 4], left: 0 }
+        Self::at(address::key(seed, 0), [0, a, b, c])
+    }
+
+    #[inline]
+    pub(super) fn at(key: [u32; 2], counter: [u32; 4]) -> Self {
+        Self { key, counter, block: [0; 4], left: 0 }
     }
 
     /// 32 random bits.

@@ -1,9 +1,12 @@
 //! What is refused, where, and with which mend.
 
+use std::ops::RangeInclusive;
+
 use serde_json::{Value, json};
 
 use super::super::{Document, apply};
 use super::{nested, point, scene};
+use tyndall::sampling::{BOUNCES, PATHS, PIXELS};
 
 /// Asserts that a patch makes a document wrong at `path`, alone, and returns the message.
 fn refused(patch: &Value, path: &str) -> String {
@@ -123,6 +126,14 @@ fn wrong_types_are_refused() {
     assert_eq!(error.to_string(), "the document: found a list of 0, expected a table");
     let error = Document::from_value(json!({ "volume": { "path": "a" }, "camera": null })).unwrap_err();
     assert!(error.to_string().contains("leave the key out"), "{error}");
+}
+
+#[test]
+fn what_has_no_random_numbers_of_its_own_is_refused() {
+    let too_many = |numbers: RangeInclusive<u32>| numbers.end() + 2;
+    refused_values("film.size", [json!([too_many(PIXELS), 1])]);
+    refused_values("render.photon.photons", [json!(too_many(PATHS))]);
+    refused_values("render.max_scatter", [json!(too_many(BOUNCES))]);
 }
 
 #[test]

@@ -13,6 +13,7 @@ use crate::integrator::history::Reading;
 use crate::light::{Enclosure, Light};
 use crate::math::{Rgb, cast};
 use crate::sampling::LightPathSampler;
+use crate::sampling::address::Emitter;
 use crate::scene::Scene;
 use crate::simd::Level;
 use chunk::Update;
@@ -20,7 +21,7 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use tracer::{Emitter, Tracer};
+use tracer::{EmissionSource, Tracer};
 
 /// The paths of one light.
 #[derive(Clone, Debug)]
@@ -85,9 +86,6 @@ impl PathNumbers {
     }
 }
 
-/// The stream of glowing matter's random numbers.
-const MATTER: u32 = u32::MAX;
-
 /// What paths start from.
 #[derive(Clone, Debug)]
 pub(crate) struct PathSource {
@@ -111,12 +109,13 @@ pub(crate) fn sources(scene: &Scene) -> Vec<PathSource> {
         Some(name) if first_of[name.as_str()] == i => {
             let mut hasher = DefaultHasher::new();
             name.hash(&mut hasher);
-            cast::low_u32(hasher.finish()) | 1 << 31
+            Emitter::Named { hash: cast::low_u32(hasher.finish()) }.number()
         }
-        _ => cast::fit_u32(i),
+        _ => Emitter::Unnamed { index: cast::fit_u32(i) }.number(),
     };
     let of_light = |(i, light): (usize, &Light)| PathSource { light: Some(light.clone()), stream: stream(i) };
-    let matter = scene.lights.emission().map(|_| PathSource { light: None, stream: MATTER });
+    let matter =
+        scene.lights.emission().map(|_| PathSource { light: None, stream: Emitter::Matter.number() });
     let mut sources: Vec<_> = lights.iter().enumerate().map(of_light).chain(matter).collect();
     sources.sort_by_key(|source| source.stream);
     sources
@@ -156,8 +155,8 @@ impl<V: Vertex> LightPaths<V> {
         self.light.as_ref().map_or(Rgb::WHITE, Light::color)
     }
 
-    fn source<'a>(light: Option<&'a Light>, scene: &'a Scene) -> Option<Emitter<'a>> {
-        light.map(Emitter::Light).or_else(|| scene.lights.emission().map(Emitter::Matter))
+    fn source<'a>(light: Option<&'a Light>, scene: &'a Scene) -> Option<EmissionSource<'a>> {
+        light.map(EmissionSource::Light).or_else(|| scene.lights.emission().map(EmissionSource::Matter))
     }
 }
 
@@ -187,7 +186,7 @@ impl Tracing<'_> {
     pub fn trace<V: Vertex>(&self, lights: &mut [LightPaths<V>]) -> TracingProgress {
         let Self { scene, ground: Ground { reading, enclosure, level }, pass, marks, limits } = *self;
         let seed = scene.render.seed;
-        let mut work: Vec<(&mut Chunk<V>, Emitter, PathNumbers)> = Vec::new();
+        let mut work: Vec<(&mut Chunk<V>, EmissionSource, PathNumbers)> = Vec::new();
         for LightPaths { light, stream, chunks, .. } in lights {
             if let Some(source) = LightPaths::<V>::source(light.as_ref(), scene) {
                 let numbers = PathNumbers { seed, pass, stream: *stream };

@@ -65,7 +65,7 @@ pub(crate) fn most_kept(max_scatter: u32) -> f64 {
 
 /// What light paths start from.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Emitter<'a> {
+pub(crate) enum EmissionSource<'a> {
     Light(&'a Light),
     Matter(&'a Emission),
 }
@@ -131,7 +131,7 @@ impl<V: Vertex> Vertices<V> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tracer<'a> {
     pub scene: &'a Scene,
-    pub source: Emitter<'a>,
+    pub source: EmissionSource<'a>,
     pub enclosure: &'a Enclosure,
     pub reading: &'a Reading,
 }
@@ -212,8 +212,8 @@ impl Tracer<'_> {
     fn emit(&self, numbers: &LightPathSampler) -> Option<Flight> {
         let u = numbers.emission();
         let emitted = match self.source {
-            Emitter::Light(light) => light.emit(self.enclosure, u),
-            Emitter::Matter(glow) => glow.emit(self.medium(), u, &mut numbers.stream(u32::MAX)),
+            EmissionSource::Light(light) => light.emit(self.enclosure, u),
+            EmissionSource::Matter(glow) => glow.emit(self.medium(), u, &mut numbers.matter_emission()),
         }?;
         Some(Flight { ray: emitted.ray, flux: emitted.flux, bounce: 0 })
     }

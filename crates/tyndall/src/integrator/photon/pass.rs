@@ -9,7 +9,7 @@ use crate::film::{PixelSample, Tile};
 use crate::integrator::cells::ChangeMarks;
 use crate::integrator::light_paths::{Ground, HistoryDetail, LightPaths, Plan, Tracing, sources};
 use crate::integrator::{Limits, Stop};
-use crate::sampling::Stream;
+use crate::sampling::address::Purpose;
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes};
 
@@ -78,7 +78,8 @@ impl Kernel for GatherPass<'_> {
             let (pixels, sample) = tile.next(S::WIDTH);
             let count = pixels.len();
             for (lane, [x, y]) in pixels.enumerate() {
-                let mut stream = Stream::new(scene.render.seed, [y * scene.size[0] + x, sample, u32::MAX]);
+                let pixel = y * scene.size[0] + x;
+                let mut stream = Purpose::ViewRay { pixel, sample }.stream(scene.render.seed);
                 let [in_x, in_y, u, v, within, due] = [(); 6].map(|()| stream.uniform());
                 let ray = scene.camera.ray(scene.size, [x as f32 + in_x, y as f32 + in_y], [u, v]);
                 let track = scene.medium.track(&ray, f32::INFINITY).shifted((within - 0.5) * view.step);

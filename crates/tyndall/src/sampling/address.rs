@@ -1,0 +1,146 @@
+//! Where the random numbers of a picture lie: the one table of what they are for, with the key and the counter \[Salmon11\] of each.
+//!
+//! Under a seed, five words tell numbers apart: the pass, which goes into the key, and the four words of the counter. The first of
+//! these counts the blocks of a [`Stream`], without end; what is drawn once may give it a meaning. A row says what values its
+//! fields may have; the tests below hold every two rows apart, but for the overlaps that they name.
+
+use super::sampler::{SEQUENCE, SOBOL_BOUNCES};
+use super::{Stream, philox};
+use crate::math::cast;
+use std::ops::RangeInclusive;
+
+/// Of samples, passes and emitters: no word is ruled out.
+const ANY: RangeInclusive<u32> = 0..=u32::MAX;
+/// Row by row; a document has no more.
+pub const PIXELS: RangeInclusive<u32> = 0..=(1 << 28) - 1;
+/// Of one emitter in one pass; a document has no more.
+pub const PATHS: RangeInclusive<u32> = 0..=(1 << 28) - 1;
+/// From 0; a document has no more.
+pub const BOUNCES: RangeInclusive<u32> = 0..=999_999;
+/// Those past the Sobol sequence.
+const LATE_BOUNCES: RangeInclusive<u32> = SOBOL_BOUNCES..=*BOUNCES.end();
+/// Sobol sequences, one after the other, of a pixel's samples and of an emitter's paths.
+const SEQUENCES_OF_SAMPLES: RangeInclusive<u32> = 0..=*ANY.end() / SEQUENCE;
+const SEQUENCES_OF_PATHS: RangeInclusive<u32> = 0..=*PATHS.end() / SEQUENCE;
+
+/// No bounce and no index of a light reaches it.
+const TOP_BIT: u32 = 1 << 31;
+
+/// Each row: a variant, the values that its fields may have, and the words that follow from them. Each word shall grow with one field.
+macro_rules! table {
+    ($(#[$about:meta])* $table:ident.$words:ident -> $of:ty {
+        $($(#[$doc:meta])* $name:ident $({ $($field:ident in $range:expr),* })? => $word:expr;)*
+    }) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug)]
+        pub(crate) enum $table {
+            $($(#[$doc])* $name $({ $($field: u32),* })?,)*
+        }
+
+        impl $table {
+            #[inline]
+            pub fn $words(self) -> $of {
+                match self {
+                    $(Self::$name $({ $($field),* })? => {
+                        $($(debug_assert!($range.contains(&$field), "{self:?}");)*)?
+                        $word
+                    })*
+                }
+            }
+
+            /// One of each row, its fields picked from the values that they may have.
+            #[cfg(test)]
+            fn each(mut pick: impl FnMut(RangeInclusive<u32>) -> u32) -> Vec<Self> {
+                vec![$(Self::$name $({ $($field: pick($range)),* })?),*]
+            }
+
+            #[cfg(test)]
+            fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name $({ $($field: _),* })? => stringify!($name),)*
+                }
+            }
+        }
+    };
+}
+
+table! {
+    /// What random numbers are for.
+    Purpose.address -> Address {
+        /// Tracking of a camera path, its draws from glowing matter, and its bounces past the Sobol sequence.
+        CameraTracking { pixel in PIXELS, sample in ANY } => stream(0, [pixel, sample, 0]);
+        /// Scramble of the Sobol sequence of camera paths.
+        CameraScramble { pixel in PIXELS, sequence in SEQUENCES_OF_SAMPLES } => once(0, [pixel, sequence, 0, 1]);
+        /// A view ray of a refinement pass: its place in the pixel, on the lens, and its steps.
+        ViewRay { pixel in PIXELS, sample in ANY } => stream(0, [pixel, sample, u32::MAX]);
+        /// Scramble of the Sobol sequence of light paths.
+        LightScramble { pass in ANY, emitter in ANY, sequence in SEQUENCES_OF_PATHS } =>
+            once(pass, [emitter, sequence, 0, 2]);
+        /// Tracking of a flight of a light path.
+        LightTracking { pass in ANY, emitter in ANY, path in PATHS, bounce in BOUNCES } =>
+            stream(pass, [emitter, path, bounce]);
+        /// A scattering of a light path past the Sobol sequence: apart from the flight's numbers, whose count is not known.
+        LightLateBounce { pass in ANY, emitter in ANY, path in PATHS, bounce in LATE_BOUNCES } =>
+            stream(pass, [emitter, path, bounce | TOP_BIT]);
+        /// Where in a glowing cell a light path begins.
+        MatterEmission { pass in ANY, path in PATHS } => stream(pass, [Emitter::Matter.number(), path, u32::MAX]);
+    }
+}
+
+table! {
+    /// What sends light paths, and the word that tells its random numbers from those of others.
+    Emitter.number -> u32 {
+        /// A light without a name of its own: by its place among the lights.
+        Unnamed { index in 0..=TOP_BIT - 1 } => index;
+        /// A light with a name: by a hash, so that it keeps its numbers when other lights come and go. One pair of names in
+        /// 2^31 shares them.
+        Named { hash in ANY } => hash | TOP_BIT;
+        /// All glowing matter.
+        Matter => u32::MAX;
+    }
+}
+
+/// Where numbers lie under a seed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Address {
+    pass: u32,
+    counter: [u32; 4],
+    /// Whether the counter's first word goes on from there.
+    is_stream: bool,
+}
+
+const fn once(pass: u32, counter: [u32; 4]) -> Address {
+    Address { pass, counter, is_stream: false }
+}
+
+const fn stream(pass: u32, [a, b, c]: [u32; 3]) -> Address {
+    Address { pass, counter: [0, a, b, c], is_stream: true }
+}
+
+/// The golden ratio spreads passes over all seeds; it is odd, so that no two passes share a key. The first has the seed itself.
+#[inline]
+pub(super) fn key(seed: u64, pass: u32) -> [u32; 2] {
+    let seed = seed.wrapping_add(u64::from(pass).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    [cast::low_u32(seed), cast::low_u32(seed >> 32)]
+}
+
+impl Purpose {
+    /// The numbers of a purpose that draws any count of them.
+    #[inline]
+    pub fn stream(self, seed: u64) -> Stream {
+        let Address { pass, counter, is_stream } = self.address();
+        debug_assert!(is_stream, "{self:?} draws once");
+        Stream::at(key(seed, pass), counter)
+    }
+
+    /// The 32 random bits of a purpose that draws once.
+    #[inline]
+    pub(super) fn bits(self, seed: u64) -> u32 {
+        let Address { pass, counter, is_stream } = self.address();
+        debug_assert!(!is_stream, "{self:?} draws more than once");
+        philox(counter, key(seed, pass))[0]
+    }
+}
+
+#[cfg(test)]
+mod tests;
