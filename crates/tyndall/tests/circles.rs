@@ -93,7 +93,12 @@ fn graph(src: &Path, folder: &Path) -> Graph {
         used.retain(|used| used != name && modules.iter().any(|(module, _)| module == used));
         (name.clone(), used)
     };
-    modules.iter().map(imports).collect()
+    let mut graph = Graph::new();
+    // A file and the folder of its name are one module.
+    for (name, used) in modules.iter().map(imports) {
+        graph.entry(name).or_default().extend(used);
+    }
+    graph
 }
 
 /// A circle of imports, if there is one.

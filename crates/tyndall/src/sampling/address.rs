@@ -4,10 +4,15 @@
 //! these counts the blocks of a [`Stream`], without end; what is drawn once may give it a meaning. A row says what values its
 //! fields may have; the tests below hold every two rows apart, but for the overlaps that they name.
 
-use super::sampler::{SEQUENCE, SOBOL_BOUNCES};
-use super::{Stream, philox};
-use crate::math::cast;
+use super::philox;
+use super::stream::{Stream, key};
 use std::ops::RangeInclusive;
+
+/// Bounces that draw from the Sobol sequence; past these a better spread no longer pays.
+pub(super) const SOBOL_BOUNCES: u32 = 12;
+
+/// Points of a Sobol sequence before it is scrambled anew.
+pub(super) const SEQUENCE: u32 = 1 << 16;
 
 /// Of samples, passes and emitters: no word is ruled out.
 const ANY: RangeInclusive<u32> = 0..=u32::MAX;
@@ -115,13 +120,6 @@ const fn once(pass: u32, counter: [u32; 4]) -> Address {
 
 const fn stream(pass: u32, [a, b, c]: [u32; 3]) -> Address {
     Address { pass, counter: [0, a, b, c], is_stream: true }
-}
-
-/// The golden ratio spreads passes over all seeds; it is odd, so that no two passes share a key. The first has the seed itself.
-#[inline]
-pub(super) fn key(seed: u64, pass: u32) -> [u32; 2] {
-    let seed = seed.wrapping_add(u64::from(pass).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-    [cast::low_u32(seed), cast::low_u32(seed >> 32)]
 }
 
 impl Purpose {

@@ -2,8 +2,8 @@
 //! is traced again, from its beginning or from any scattering on, draws the same.
 
 use super::Stream;
-use super::address::Purpose;
-use super::sampler::{BounceSample, SEQUENCE, SOBOL_BOUNCES};
+use super::address::{Purpose, SEQUENCE, SOBOL_BOUNCES};
+use super::sampler::BounceSample;
 use sobol_burley::sample_4d;
 
 /// Owen-scrambled Sobol points \[Burley20\] over the paths of a light, and a [`Stream`] per flight.

@@ -1,15 +1,9 @@
 //! The numbers of one camera path: low discrepancy for its first bounces, a random stream after.
 
 use super::Stream;
-use super::address::Purpose;
+use super::address::{Purpose, SEQUENCE, SOBOL_BOUNCES};
 use super::stream::exponential;
 use sobol_burley::sample_4d;
-
-/// Bounces that draw from the Sobol sequence; past these a better spread no longer pays.
-pub(super) const SOBOL_BOUNCES: u32 = 12;
-
-/// Points of a Sobol sequence before it is scrambled anew.
-pub(super) const SEQUENCE: u32 = 1 << 16;
 
 /// The numbers of one scattering event, each in [0, 1).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,7 @@
 //! A stream of independent random numbers addressed by a counter.
 
-use super::{address, philox};
+use super::philox;
+use crate::math::cast;
 
 /// Uniform numbers of one address under a seed; two streams with different addresses never meet.
 #[derive(Clone, Debug)]
@@ -16,7 +17,7 @@ impl Stream {
     /// The stream of `[a, b, c]` under a seed: for numbers beside a picture. Those in it may have the same address.
     #[must_use]
     pub fn new(seed: u64, [a, b, c]: [u32; 3]) -> Self {
-        Self::at(address::key(seed, 0), [0, a, b, c])
+        Self::at(key(seed, 0), [0, a, b, c])
     }
 
     #[inline]
@@ -47,6 +48,13 @@ impl Stream {
     pub fn exponential(&mut self) -> f32 {
         exponential(self.uniform())
     }
+}
+
+/// The golden ratio spreads passes over all seeds; it is odd, so that no two passes share a key. The first has the seed itself.
+#[inline]
+pub(super) fn key(seed: u64, pass: u32) -> [u32; 2] {
+    let seed = seed.wrapping_add(u64::from(pass).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    [cast::low_u32(seed), cast::low_u32(seed >> 32)]
 }
 
 /// The top 24 bits as a number in [0, 1).

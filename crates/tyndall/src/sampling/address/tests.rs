@@ -1,6 +1,7 @@
 //! No two purposes share random numbers, but for what is known.
 
 use super::*;
+use crate::math::cast;
 use crate::sampling::{LightPathSampler, PathSampler};
 use std::collections::BTreeSet;
 
