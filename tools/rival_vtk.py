@@ -1,6 +1,6 @@
 """Times Tyndall's `raymarch` without shadows and VTK's CPU ray caster on one volume, view and size, by turns.
 
-    python docs/rival_vtk.py [--tyndall target/release/tyndall] [--rounds 5]
+    python tools/rival_vtk.py [--tyndall target/release/tyndall] [--rounds 5]
 
 Needs `pip install vtk numpy`. Both take one-voxel steps at 512 x 512 through 256^3 bytes, a mostly empty head of shells, unshaded,
 on all cores. Tyndall's time is `stages.render`, VTK's that of `Render()` after a first frame.

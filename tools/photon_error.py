@@ -1,4 +1,4 @@
-"""Error of `photon` against `path` by photons, radius and passes, as a plot: python3 docs/photon_error.py
+"""Error of `photon` against `path` by photons, radius and passes, as a plot: python3 tools/photon_error.py
 
 Needs the release build, and numpy, OpenEXR and matplotlib from PyPI; takes some minutes. The scene has layers, fog between them and
 two scatterings; errors are the root of the mean square over the mean of the picture, beside what of it is noise alone."""

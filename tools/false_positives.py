@@ -1,4 +1,4 @@
-"""Light paths and segments computed again for the same result, by bits and groups of histories: python3 docs/false_positives.py
+"""Light paths and segments computed again for the same result, by bits and groups of histories: python3 tools/false_positives.py
 
 Needs the release build. Each edit recolours one band of data values, or makes it thinner by a tenth; printed is what was computed again
 in vain over all paths and segments, under `spatial = "cells"`, where photons that changed ask for segments too."""

@@ -1,4 +1,4 @@
-"""Bias at a flat skin of four ways to make radiance of photons: python3 docs/eq8.py
+"""Bias at a flat skin of four ways to make radiance of photons: python3 tools/eq8.py
 
 Light falls straight onto the half space x > 0 and is seen from straight above; one scattering. Lengths are in radii of the
 gather, of which a ball has the weight 3/4 (1 - x^2) across. Printed is radiance over the true one, by optical radius."""

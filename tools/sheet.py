@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Renders every preset over the given volumes and lays the pictures out as one sheet.
 
-  python3 docs/sheet.py SHEET.jpg VOLUME[:PRESET,PRESET...]...      (pip install pillow; `tyndall` built in target/release)
+  python3 tools/sheet.py SHEET.jpg VOLUME[:PRESET,PRESET...]...      (pip install pillow; `tyndall` built in target/release)
 """
 import pathlib, subprocess, sys, tempfile
 from PIL import Image, ImageDraw

@@ -1,6 +1,6 @@
 """Times Tyndall's `path` and Mitsuba 3 on the scenes of a folder of reference pictures, in one run, by turns.
 
-    python docs/rivals.py REFERENCE [SCENE ...] [--tyndall target/release/tyndall] [--rounds 3]
+    python tools/rivals.py REFERENCE [SCENE ...] [--tyndall target/release/tyndall] [--rounds 3]
 
 Needs `pip install mitsuba numpy OpenEXR`, libLLVM 19 and DRJIT_LIBLLVM_PATH set to it. A row tells the seconds that each would
 need for a relative mean squared error of 0.01: seconds times error, both of the same picture, the error less that of the reference
