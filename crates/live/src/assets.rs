@@ -30,6 +30,7 @@ impl Assets {
 
 /// What a volume's source said beside the volume.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Source {
     /// Components per voxel in the file.
     pub channels: usize,
@@ -41,6 +42,7 @@ pub struct Source {
 
 /// Why an asset could not be had.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AssetError {
     /// The volume's file.
     #[error(transparent)]

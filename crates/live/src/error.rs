@@ -6,6 +6,7 @@ use crate::document::DocumentError;
 
 /// Why a session could not be opened, or an edit not be applied; `at` names the file, or the edit in it.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum LiveError {
     /// A file that cannot be read as what it should be.
     #[error("{at}: {problem}")]

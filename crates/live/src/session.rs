@@ -37,6 +37,7 @@ pub struct LiveSession {
 
 /// What an edit did.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct EditReport {
     /// What of the scene changed.
     pub difference: Difference,

@@ -1,7 +1,8 @@
 //! Tyndall renders volumes under real global illumination and stays interactive while they are edited.
 //!
-//! This crate is the renderer: it knows no file, window, server, Python or GPU. Modules follow the
-//! concepts of the field, and imports run one way, from [`math`] up to the session.
+//! This crate is the renderer: it knows no file, document, window, server, Python or GPU. Modules follow the
+//! concepts of the field, and imports run one way, from [`math`] up to the [`session`]. Programs that open files and edit
+//! scenes start from `tyndall_live::LiveSession`, whose crate shows both in ten lines.
 
 pub mod camera;
 pub mod film;

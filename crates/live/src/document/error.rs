@@ -9,6 +9,7 @@ use tyndall::message::{excerpt, quoted};
 
 /// A document that does not describe a scene.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum DocumentError {
     /// The text is not of its language.
     #[error("line {line}, column {column}: {message}; expected a scene document in {language}")]

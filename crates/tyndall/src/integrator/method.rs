@@ -217,6 +217,7 @@ pub struct PixelCounts {
 
 /// What a method has computed since the last edit, or since the beginning, and what it keeps for edits to come.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct MethodReport {
     /// Of each kind of work item, such as pixels or view-ray segments, the share that was computed.
     pub recomputed: Vec<WorkShare>,

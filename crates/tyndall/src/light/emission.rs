@@ -191,8 +191,8 @@ fn mean_emission(medium: &Medium, cell: &Bounds) -> f32 {
     for z in steps(2) {
         for y in steps(1) {
             for x in steps(0) {
-                let optics = medium.optics(Vec3::new(x, y, z));
-                sum += optics.opacity * optics.emitted().luminance();
+                let value = medium.volume().value(Vec3::new(x, y, z));
+                sum += medium.transfer().emitted_luminance(value);
                 count += 1.0;
             }
         }

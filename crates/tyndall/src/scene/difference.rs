@@ -7,6 +7,7 @@ use std::collections::HashMap;
 /// What changed from one scene to another, in terms of what light transport reads. Settings of display (exposure, tone) and of
 /// stopping (samples) are not part of a scene.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 #[expect(clippy::struct_excessive_bools, reason = "each is a thing by itself that changed or did not")]
 pub struct Difference {
     /// Values that now mean other optics.

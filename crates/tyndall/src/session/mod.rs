@@ -31,6 +31,7 @@ impl Budget {
 
 /// How far a session is.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Progress {
     /// Samples that every pixel has at least.
     pub samples: u32,

@@ -244,6 +244,20 @@ impl TransferFunction {
         opacity * Rgb::from(channel).luminance()
     }
 
+    /// Luminance that matter of a value emits per unit length at density 1, `opacity (1 - albedo) Le`: to the last bit what
+    /// [`Self::optics`] gives, without computing the other optics.
+    #[inline]
+    #[must_use]
+    pub fn emitted_luminance(&self, value: f32) -> f32 {
+        let (a, b, t) = self.locate(value);
+        let (a, b) = (&a.optics, &b.optics);
+        if a.emission.is_black() && b.emission.is_black() {
+            return 0.0;
+        }
+        let opacity = a.opacity + (b.opacity - a.opacity) * t;
+        opacity * ((Rgb::WHITE - a.albedo.lerp(b.albedo, t)) * a.emission.lerp(b.emission, t)).luminance()
+    }
+
     /// Whether any matter glows.
     #[must_use]
     pub fn emits(&self) -> bool {
@@ -357,6 +371,20 @@ mod tests {
         assert_eq!(new(&[1.0, 1.0, 1.0]), Err(TransferError::Order { index: 2 }));
         assert_eq!(new(&[f32::NAN]), Err(TransferError::Order { index: 0 }));
         assert!(new(&[1.0, 1.0, 2.0, 2.0]).is_ok());
+    }
+
+    #[test]
+    fn emitted_luminance_is_that_of_the_optics() {
+        let mut points =
+            vec![point(0.0, 0.3, 0.2), point(1.0, 0.9, 0.7), point(2.5, 0.5, 0.1), point(3.0, 0.7, 0.4)];
+        points[1].optics.emission = Rgb::new(3.0, 0.1, 0.7);
+        let function = TransferFunction::new(points).unwrap();
+        for i in 0..4000 {
+            let value = i as f32 * 1e-3 - 0.3;
+            let optics = function.optics(value);
+            let expected = optics.opacity * optics.emitted().luminance();
+            assert_eq!(function.emitted_luminance(value).to_bits(), expected.to_bits(), "at {value}");
+        }
     }
 
     #[test]
