@@ -1,6 +1,7 @@
 //! Everything that a scene document names: its volume and its environment maps.
 
 use crate::document::{self, Document};
+use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -91,7 +92,8 @@ pub fn load(document: &Document, folder: &Path) -> Result<(Assets, Source), Asse
     Ok((Assets { volume, maps }, source))
 }
 
-/// Reads what a document names that the one before an edit did not; the rest is shared with that one's assets.
+/// Reads what a document names that the one before an edit did not; the rest is shared with that one's assets. In
+/// parallel on a thread pool.
 ///
 /// # Errors
 /// [`AssetError`] names the file or key.
@@ -99,18 +101,27 @@ pub fn reload(
     document: &Document,
     folder: &Path,
     before: (&Document, &Assets),
+    threads: &ThreadPool,
 ) -> Result<Assets, AssetError> {
     let (old, assets) = before;
     let interpolation = interpolation(document);
     let same = document::Volume { interpolation: old.volume.interpolation, ..document.volume.clone() };
     let volume = if same != old.volume {
-        Arc::new(volume(&document.volume, folder)?.0.with_interpolation(interpolation))
+        let (volume, _) = threads.install(|| volume(&document.volume, folder))?;
+        Arc::new(volume.with_interpolation(interpolation))
     } else if assets.volume.interpolation() == interpolation {
         assets.volume.clone()
     } else {
         Arc::new((*assets.volume).clone().with_interpolation(interpolation))
     };
-    Ok(Assets { volume, maps: maps(document, folder, &assets.maps)? })
+    let known = |light: &document::Light| match light {
+        document::Light::Environment { map: Some(name), .. } => assets.maps.contains_key(name),
+        _ => true,
+    };
+    let maps = || maps(document, folder, &assets.maps);
+    let all_known = document.lights.iter().flatten().all(known);
+    // To call other threads where there is nothing to read would take longer than the edit.
+    Ok(Assets { volume, maps: if all_known { maps() } else { threads.install(maps) }? })
 }
 
 fn interpolation(document: &Document) -> Interpolation {

@@ -2,6 +2,7 @@
 
 use crate::assets::Assets;
 use crate::document::{self, Document};
+use rayon::ThreadPool;
 use std::fmt::Display;
 use std::sync::Arc;
 use tyndall::camera::{AutoView, Camera, FitLens, Lens, fit};
@@ -48,13 +49,13 @@ pub struct Built {
 }
 
 impl Built {
-    /// Builds the scene of a document, in parallel on the current thread pool.
+    /// Builds the scene of a document, in parallel on a thread pool.
     ///
     /// # Errors
     /// [`SceneError`] for what only shows beside the volume: a preset that is not there, a view
     /// without a frame, a map that was not given.
-    pub fn new(document: Document, assets: Assets) -> Result<Self, SceneError> {
-        let scene = build(&document, &assets, None)?;
+    pub fn new(document: Document, assets: Assets, threads: &ThreadPool) -> Result<Self, SceneError> {
+        let scene = build(&document, &assets, None, threads)?;
         Ok(Self { document, assets, scene })
     }
 
@@ -63,19 +64,29 @@ impl Built {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn edited(&self, document: Document, assets: Assets) -> Result<Self, SceneError> {
-        let scene = build(&document, &assets, Some(self))?;
+    pub fn edited(
+        &self,
+        document: Document,
+        assets: Assets,
+        threads: &ThreadPool,
+    ) -> Result<Self, SceneError> {
+        let scene = build(&document, &assets, Some(self), threads)?;
         Ok(Self { document, assets, scene })
     }
 }
 
-fn build(document: &Document, assets: &Assets, before: Option<&Built>) -> Result<Scene, SceneError> {
+fn build(
+    document: &Document,
+    assets: &Assets,
+    before: Option<&Built>,
+    threads: &ThreadPool,
+) -> Result<Scene, SceneError> {
     let volume = &assets.volume;
     let same_volume = before.filter(|before| Arc::ptr_eq(&before.assets.volume, volume));
-    let medium = medium(document, volume, same_volume)?;
+    let medium = medium(document, volume, same_volume, threads)?;
     Ok(Scene {
         light_names: light_names(document, volume),
-        lights: lights(document, assets, &medium, same_volume)?,
+        lights: lights(document, assets, &medium, same_volume, threads)?,
         medium,
         camera: camera(document, volume)?,
         size: document.film.size,
@@ -93,6 +104,7 @@ fn medium(
     document: &Document,
     volume: &Arc<Volume>,
     before: Option<&Built>,
+    threads: &ThreadPool,
 ) -> Result<Arc<Medium>, SceneError> {
     let same_transfer = before.filter(|b| b.document.transfer_function == document.transfer_function);
     let same =
@@ -112,11 +124,15 @@ fn medium(
     }
     let transfer = match same_transfer {
         Some(before) => before.scene.medium.shared_transfer().clone(),
-        None => Arc::new(transfer(document, volume)?),
+        None => Arc::new(threads.install(|| transfer(document, volume))?),
     };
     let settings = medium_settings(document)?;
     let old = before.map(|before| &*before.scene.medium);
-    Ok(Arc::new(Medium::after(old, volume.clone(), transfer, &settings)))
+    let build = || Medium::after(old, volume.clone(), transfer, &settings);
+    // To call other threads for what is shared anyway would take longer than the edit.
+    let cell = document.medium.majorant_cell;
+    let shares_majorants = same_transfer.is_some_and(|b| b.document.medium.majorant_cell == cell);
+    Ok(Arc::new(if shares_majorants { build() } else { threads.install(build) }))
 }
 
 /// The lights and the glowing matter, shared with the scene before an edit as far as that left them alone.
@@ -125,6 +141,7 @@ fn lights(
     assets: &Assets,
     medium: &Medium,
     before: Option<&Built>,
+    threads: &ThreadPool,
 ) -> Result<Arc<LightSet>, SceneError> {
     let same_lights = before.filter(|b| b.document.lights == document.lights && b.assets.shares_maps(assets));
     let same_matter = before.filter(|b| b.scene.medium.shares_matter(medium));
@@ -142,7 +159,8 @@ fn lights(
             lights.iter().enumerate().map(read).collect::<Result<_, _>>()?
         }
     };
-    let emission = Emission::after(same_matter.and_then(|b| b.scene.lights.emission()), medium);
+    let emission = || Emission::after(same_matter.and_then(|b| b.scene.lights.emission()), medium);
+    let emission = if medium.transfer().emits() { threads.install(emission) } else { None };
     Ok(Arc::new(LightSet::with_emission(lights, medium, emission)))
 }
 

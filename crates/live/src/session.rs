@@ -80,9 +80,7 @@ impl LiveSession {
     /// Builds a scene from nothing, if there is memory for it.
     fn build(document: Document, assets: Assets, options: &Options, at: &str) -> Result<Built, LiveError> {
         admission::film(&document, at)?;
-        let built = options
-            .threads
-            .install(|| Built::new(document, assets))
+        let built = Built::new(document, assets, &options.threads)
             .map_err(|source| LiveError::Scene { at: at.to_owned(), source })?;
         admission::method(&built.scene, at)?;
         Ok(built)
@@ -163,13 +161,18 @@ impl LiveSession {
     fn go_to(&mut self, value: Value, at: &str) -> Result<EditReport, LiveError> {
         let begun = Instant::now();
         let (document, assets) = self.parse(value.clone(), at)?;
-        admission::film(&document, at)?;
+        let before = &self.built.document;
+        if document.film.size != before.film.size {
+            admission::film(&document, at)?;
+        }
+        let more_memory = document.film.size != before.film.size || document.render != before.render;
         let built = self
-            .options
-            .threads
-            .install(|| self.built.edited(document, assets))
+            .built
+            .edited(document, assets, &self.options.threads)
             .map_err(|source| LiveError::Scene { at: at.to_owned(), source })?;
-        admission::method(&built.scene, at)?;
+        if more_memory {
+            admission::method(&built.scene, at)?;
+        }
         let to_scene = begun.elapsed();
         let difference = self.session.set_scene(built.scene.clone());
         let known = notes_of(&self.built.scene);
@@ -183,10 +186,7 @@ impl LiveSession {
         let document = Document::from_value(value)
             .map_err(|source| LiveError::Document { at: at.to_owned(), source })?;
         let before = (&self.built.document, &self.built.assets);
-        let assets = self
-            .options
-            .threads
-            .install(|| assets::reload(&document, &self.folder, before))
+        let assets = assets::reload(&document, &self.folder, before, &self.options.threads)
             .map_err(|source| LiveError::Asset { at: at.to_owned(), source: Box::new(source) })?;
         Ok((document, assets))
     }

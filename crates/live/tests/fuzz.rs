@@ -127,7 +127,7 @@ fn try_scene(text: &str, json: bool, volume: Arc<Volume>) -> Result<(), String> 
     document.render.draft();
     let names = ["map.exr", "a.hdr"].map(|name| (name.to_owned(), MAP.clone()));
     let assets = Assets { volume, maps: BTreeMap::from(names) };
-    let scene = THREADS.install(|| Built::new(document, assets)).map_err(|e| helpful(&e))?.scene;
+    let scene = Built::new(document, assets, &THREADS).map_err(|e| helpful(&e))?.scene;
     let mut session = Session::new(scene, THREADS.clone());
     session.refine(&Budget::samples(2));
     let image = session.film().image();

@@ -58,7 +58,7 @@ impl Bench {
     /// The scene with a patch laid over it.
     pub fn scene(&self, patch: &Value) -> Result<Scene, Failure> {
         let document = Document::from_value(document::apply(&self.value, patch)).map_err(Failure::input)?;
-        let built = self.threads.install(|| Built::new(document, self.assets.clone()));
+        let built = Built::new(document, self.assets.clone(), &self.threads);
         Ok(built.map_err(Failure::input)?.scene)
     }
 

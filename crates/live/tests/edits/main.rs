@@ -36,7 +36,7 @@ fn scene(value: &Value) -> Scene {
         Interpolation::Linear => VOLUME.clone(),
         Interpolation::Nearest => Arc::new((**VOLUME).clone().with_interpolation(interpolation)),
     };
-    Built::new(document, Assets { volume, maps: BTreeMap::new() }).expect("a scene").scene
+    Built::new(document, Assets { volume, maps: BTreeMap::new() }, &THREADS).expect("a scene").scene
 }
 
 fn base(integrator: &str) -> Value {

@@ -182,20 +182,17 @@ impl Emission {
 
 /// Mean over the voxel centres of a cell of the luminance emitted per unit length at density 1.
 fn mean_emission(medium: &Medium, cell: &Bounds) -> f32 {
-    let (mut sum, mut count) = (0.0, 0.0);
     // The first centre lies half a voxel inside the cell.
-    let steps = |axis: usize| {
+    let centres = |axis: usize| -> ([f32; CELL], usize) {
         let (start, end) = (cell.min[axis] + 0.5, cell.max[axis]);
-        (0..CELL).map(move |i| start + i as f32).take_while(move |&x| x < end)
+        let all = [0.0, 1.0, 2.0, 3.0].map(|i| start + i);
+        (all, all.iter().take_while(|&&x| x < end).count())
     };
-    for z in steps(2) {
-        for y in steps(1) {
-            for x in steps(0) {
-                let value = medium.volume().value(Vec3::new(x, y, z));
-                sum += medium.transfer().emitted_luminance(value);
-                count += 1.0;
-            }
-        }
-    }
-    sum / count
+    let axes = [centres(0), centres(1), centres(2)];
+    let count = axes.iter().map(|axis| axis.1).product::<usize>();
+    let mut values = [0.0; CELL * CELL * CELL];
+    let [x, y, z] = &axes;
+    medium.volume().value_block([&x.0[..x.1], &y.0[..y.1], &z.0[..z.1]], &mut values[..count]);
+    let sum = values[..count].iter().map(|&value| medium.transfer().emitted_luminance(value)).sum::<f32>();
+    sum / count as f32
 }

@@ -284,6 +284,28 @@ impl Volume {
         self.slope * stored + self.intercept
     }
 
+    /// [`Self::value`] at all positions whose coordinates along each axis are among up to four ascending ones, no further apart
+    /// than 1; x fastest, to the last bit.
+    pub(crate) fn value_block(&self, axes: [&[f32]; 3], out: &mut [f32]) {
+        match self.interpolation {
+            Interpolation::Linear => with_voxels!(self.bricks.samples(), samples => {
+                self.lattice.linear_block(samples, axes, out);
+            }),
+            Interpolation::Nearest => {
+                let [xs, ys, zs] = axes;
+                let positions = zs
+                    .iter()
+                    .flat_map(|&z| ys.iter().flat_map(move |&y| xs.iter().map(move |&x| Vec3::new(x, y, z))));
+                for (out, p) in out.iter_mut().zip(positions) {
+                    *out = with_voxels!(self.bricks.samples(), samples => {
+                        self.lattice.read(samples, p, Interpolation::Nearest)
+                    });
+                }
+            }
+        }
+        out.iter_mut().for_each(|stored| *stored = self.slope * *stored + self.intercept);
+    }
+
     /// Gradient of the field per world unit, by central differences of points one voxel apart
     /// (half a voxel to each side along every index axis).
     #[inline]
