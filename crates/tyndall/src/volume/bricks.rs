@@ -309,12 +309,11 @@ impl Lattice {
         }
         let mut out = out.iter_mut();
         for &(k, f) in &z.positions[..z.count] {
-            for j in 0..y.count {
-                for i in 0..x.count {
-                    if let Some(out) = out.next() {
-                        *out = mix(planes[k][j][i], planes[k + 1][j][i], f);
-                    }
-                }
+            let pairs = planes[k].iter().zip(&planes[k + 1]).take(y.count);
+            for (near, far) in pairs {
+                let values = near.iter().zip(far).take(x.count).map(|(&near, &far)| mix(near, far, f));
+                // In this order: a `zip` that ends takes one more of its first.
+                values.zip(out.by_ref()).for_each(|(value, out)| *out = value);
             }
         }
     }

@@ -22,7 +22,8 @@ pub use voxels::{Voxel, Voxels};
 
 use crate::math::{Vec3, cast};
 use bricks::Lattice;
-use std::sync::{Arc, OnceLock};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use voxels::with_voxels;
 
 /// How the field is read between voxel centres.
@@ -89,17 +90,19 @@ pub struct Volume {
     robust_range: [f64; 2],
     non_finite: u64,
     cells: Arc<Cells>,
-    counts: Arc<Counts>,
+    statistics: Arc<Statistics>,
     lattice: Lattice,
     slope: f32,
     intercept: f32,
 }
 
-/// Histograms that are counted once, when they are first asked for, and are then kept with the samples.
+/// Statistics that are computed once, when they are first asked for, and are then kept with the samples.
 #[derive(Debug, Default)]
-struct Counts {
+struct Statistics {
     robust: OnceLock<Histogram>,
     value_bins: OnceLock<Histogram>,
+    /// Cells by their edge.
+    cells: Mutex<BTreeMap<usize, Arc<Cells>>>,
 }
 
 impl Volume {
@@ -134,7 +137,7 @@ impl Volume {
             value_range,
             robust_range,
             non_finite,
-            counts: Arc::default(),
+            statistics: Arc::default(),
             slope: cast::single(slope),
             intercept: cast::single(intercept),
         })
@@ -238,7 +241,19 @@ impl Volume {
         if edge == Cells::EDGE {
             return self.cells.clone();
         }
-        Arc::new(Cells::new(&self.grid, &self.bricks, self.values, edge))
+        /// Smaller cells take as much memory as the samples, and are not kept.
+        const LEAST_KEPT: usize = 4;
+        let new = || Arc::new(Cells::new(&self.grid, &self.bricks, self.values, edge));
+        if (1..LEAST_KEPT).contains(&edge) {
+            return new();
+        }
+        // The lock is not held while cells are made in parallel, or a worker that waits for it could block the others.
+        let kept = || self.statistics.cells.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = kept().get(&edge).cloned();
+        found.unwrap_or_else(|| {
+            let cells = new();
+            kept().entry(edge).or_insert(cells).clone()
+        })
     }
 
     /// Counts of the data values in equal bins over `range`; values outside count in the end bins.
@@ -252,13 +267,13 @@ impl Volume {
     pub fn robust_histogram(&self) -> &Histogram {
         /// Fine enough to set a threshold, coarse enough for every bin to mean something.
         const BINS: usize = 256;
-        self.counts.robust.get_or_init(|| self.histogram(self.robust_range, BINS))
+        self.statistics.robust.get_or_init(|| self.histogram(self.robust_range, BINS))
     }
 
     /// The histogram over the inner [`ValueBins`], all but the outermost two.
     #[must_use]
     pub fn value_bin_histogram(&self) -> &Histogram {
-        self.counts.value_bins.get_or_init(|| {
+        self.statistics.value_bins.get_or_init(|| {
             let bins = self.value_bins();
             let ends = [1.0, (ValueBins::COUNT - 1) as f32].map(|border| f64::from(bins.value(border)));
             self.histogram(ends, ValueBins::INSIDE)
