@@ -11,6 +11,7 @@ use crate::scattering::{Brdf, Phase};
 use crate::scene::{Background, MethodChoice, RenderSettings, Scene};
 use crate::simd::Level;
 use crate::transfer::{Optics, Point, TransferFunction};
+use crate::volume::Volume;
 use crate::volume::procedural::{Field, Kind};
 use schemars::SchemaGenerator;
 use serde_json::Value;
@@ -19,8 +20,12 @@ use std::sync::{Arc, LazyLock};
 static THREADS: LazyLock<Arc<rayon::ThreadPool>> =
     LazyLock::new(|| Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads")));
 
+/// The same samples in every scene, so that an edit does not begin anew because of them.
+static VOLUME: LazyLock<Arc<Volume>> =
+    LazyLock::new(|| Arc::new(Field::new(Kind::Cloud, [12, 11, 10], 1).volume().expect("a field")));
+
 fn scene(method: MethodChoice, density: f32) -> Scene {
-    let volume = Arc::new(Field::new(Kind::Cloud, [12, 11, 10], 1).volume().expect("a field"));
+    let volume = VOLUME.clone();
     let point = |value, opacity| Point { value, optics: Optics { opacity, ..Optics::default() } };
     let points = vec![point(0.1, 0.0), point(0.9, 1.0)];
     let transfer = Arc::new(TransferFunction::over(volume.value_bins(), points).expect("a function"));
