@@ -76,7 +76,7 @@ impl MajorantGrid {
     }
 
     /// The cells along a track in order, empty ones that follow each other in one stretch as far as can be seen.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn walk(&self, track: &Track) -> CellWalk<'_> {
         CellWalk::new(self, track)
@@ -84,7 +84,7 @@ impl MajorantGrid {
 
     /// The cells along a track in order, each by itself. Stretches with matter are those of [`Self::walk`] to the last bit, so
     /// that results computed along them do not depend on empty space beside the ray.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn walk_singly(&self, track: &Track) -> CellWalk<'_, false> {
         CellWalk::new(self, track)
@@ -185,7 +185,8 @@ impl Axis {
 const ROUNDING: f32 = 4e-6;
 
 impl<'a, const LEAPS: bool> CellWalk<'a, LEAPS> {
-    #[inline]
+    // A shadow ray is often a few cells long: a call would cost some percent of it.
+    #[inline(always)]
     fn new(grid: &'a MajorantGrid, track: &Track) -> Self {
         let per_cell = 1.0 / grid.edge;
         let entry = track.ray.origin * per_cell;
