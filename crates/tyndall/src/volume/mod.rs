@@ -3,6 +3,7 @@
 //! Values are *data values*: what the file means, after slope and intercept. The field is trilinear
 //! between voxel centres (or nearest), and clamped to the edge value in the half voxel around them.
 
+mod block;
 mod bricks;
 mod cells;
 mod grid;
