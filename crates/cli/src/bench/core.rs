@@ -1,4 +1,4 @@
-//! What the path tracer and the ray marcher stand on.
+//! Marching, flights, paths, threads and lateness.
 
 use super::Row;
 use super::scenes::{Bench, cloud, ct};
@@ -14,7 +14,7 @@ use tyndall::scene::Scene;
 use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
 
-/// Steps of all primary rays of a picture, as marching takes them.
+/// The number of march steps of all primary rays of a picture.
 fn steps(scene: &Scene, step: f32) -> f64 {
     let [width, height] = scene.size;
     let step = step * scene.medium.volume().grid().voxel_size();
@@ -35,12 +35,11 @@ pub fn sampling(effort: &Effort, _: Level) -> Result<Vec<Row>, Failure> {
     let side = effort.pick(512, 128);
     let flat = |cell: u32, density: f64| {
         bench.scene(&json!({
-            "film": { "size": [side, side] }, "medium": { "density": density },
-            "medium": { "majorant_cell": cell },
+            "film": { "size": [side, side] }, "medium": { "density": density, "majorant_cell": cell },
             "render": { "integrator": "raymarch", "max_scatter": 0 },
         }))
     };
-    // So thin that no ray ends early; one cell around everything is never empty.
+    // The medium is so thin that no ray ends early; a single cell around the volume is never empty.
     let (all, skipping) = (flat(0, 1e-4)?, flat(8, 1e-4)?);
     let samples = steps(&all, 0.5);
     let cells = skipping.medium.majorants().opacities();
@@ -76,7 +75,7 @@ pub fn sampling(effort: &Effort, _: Level) -> Result<Vec<Row>, Failure> {
     Ok(rows)
 }
 
-/// Rays from all around through the middle of a medium.
+/// Sum of the transmittances of rays that start around the medium and pass near its centre.
 fn transmittances(medium: &Medium, level: Level, rays: u32) -> f32 {
     let bounds = medium.volume().grid().world_bounds();
     let (middle, size) = (bounds.center(), bounds.size());
@@ -155,7 +154,7 @@ pub fn threads(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     Ok(rows)
 }
 
-/// How late a deadline is honoured, and how long an edit of the transfer function takes to prepare.
+/// How long after its deadline each method stops, and how long majorants take after an edit of the transfer function.
 pub fn latency(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str = "latency, two threads";
     let bench = Bench::new(ct(effort.pick(256, 64)), 2)?;

@@ -1,4 +1,4 @@
-//! What an edit of a photon-mapped scene costs, against the scene from nothing.
+//! The cost of an edit of a photon-mapped scene, against a render of the edited scene from nothing.
 
 use super::scenes::Bench;
 use super::timing::{Effort, median};
@@ -10,42 +10,72 @@ use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
 use tyndall_live::document;
 
-/// What an edit is held against.
+/// What an edit is compared with.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Against {
-    /// Renders from nothing, to whose picture it must come bit for bit.
+    /// Renders from nothing, whose picture it must equal bit for bit.
     Equal,
-    /// Renders from nothing, to whose picture it need not come.
+    /// Renders from nothing, whose picture it need not equal.
     Unequal,
-    /// The first picture of its own session, which is as much work where the edit is of a colour: half the time, no check.
+    /// The first picture of its own session: as much work where only a colour is edited, in half the time, without a check.
     First,
 }
 
-/// An edit.
+/// An edit to measure.
 pub struct Edit<'a> {
     /// The document.
     pub bench: &'a Bench,
-    /// The patch that gives the scene before it.
+    /// The patch from the document to the scene before the edit.
     pub before: Value,
-    /// The patch that it is.
+    /// The edit itself, a patch to that scene.
     pub patch: Value,
+    /// What it is compared with.
     pub against: Against,
-    /// Whether a single segment per ray is measured too.
+    /// Whether one segment per ray is measured too.
     pub plain: bool,
-    /// Seconds during which the scene from nothing is rendered again, and a quarter of those during which the edit is played
-    /// again; both are once in any case.
+    /// Renders from nothing are repeated for this many seconds, edits for four times as many; each runs at least once.
     pub patience: f64,
 }
 
-/// What it took, as medians.
+/// A figure for each stage of a photon mapper; the stages are named for the items that they compute.
+#[derive(Clone, Copy, Default)]
+pub struct PerStage {
+    /// Tracing light paths.
+    pub photons: f64,
+    /// Marching the segments of view rays.
+    pub segments: f64,
+}
+
+impl PerStage {
+    /// The figures, looked up by the stages' names.
+    fn by_name(figure: impl Fn(&str) -> f64) -> Self {
+        Self { photons: figure("photons"), segments: figure("segments") }
+    }
+
+    /// Both together.
+    pub fn sum(self) -> f64 {
+        self.photons + self.segments
+    }
+}
+
+/// How long a picture took.
+#[derive(Clone, Copy)]
+pub struct Seconds {
+    /// The stages alone.
+    pub stages: PerStage,
+    /// From the document to the picture.
+    pub total: f64,
+}
+
+/// What an edit cost; times are medians.
 pub struct Cost {
-    /// From nothing: seconds for photons, for segments, and from the edited document to the picture.
-    pub scratch: [f64; 3],
-    /// The edit: the same.
-    pub edit: [f64; 3],
-    /// Of photons and segments that a picture from nothing computes, the share that the edit did.
-    pub shares: [f64; 2],
-    /// Of the places on view rays where a picture from nothing gathers photons, the share at which the edit did.
+    /// A render of the edited scene from nothing.
+    pub scratch: Seconds,
+    /// The edit of the live session.
+    pub edit: Seconds,
+    /// The share of the photons and segments of a render from nothing that the edit computed.
+    pub shares: PerStage,
+    /// The share of the gathers of a render from nothing that the edit made.
     pub gathers: f64,
     /// The whole from nothing with one segment per ray.
     pub plain: Option<f64>,
@@ -73,7 +103,7 @@ impl Edit<'_> {
         }
         let (mut picture, mut all, mut kept) = (Vec::new(), computed(&live), live.report().kept);
         let (mut all_gathers, mut gathers) = (gathers_of(&live), 0.0);
-        let mut shares = [0.0; 2];
+        let mut shares = PerStage::default();
         let begun = Instant::now();
         let patient = |times: f64| begun.elapsed().as_secs_f64() < times * self.patience;
         for round in 0..effort.rounds.min(EDITS) {
@@ -97,7 +127,11 @@ impl Edit<'_> {
             live.refine(&Budget::samples(1));
             edit.add(&live, start);
             let done = computed(&live);
-            shares = [0, 1].map(|i| if all[i] > 0.0 { done[i] / all[i] } else { 0.0 });
+            let share = |done: f64, all: f64| if all > 0.0 { done / all } else { 0.0 };
+            shares = PerStage {
+                photons: share(done.photons, all.photons),
+                segments: share(done.segments, all.segments),
+            };
             gathers = gathers_of(&live) as f64 / all_gathers.max(1) as f64;
             if self.against == Against::Equal {
                 check(&bits(&live), &picture)?;
@@ -106,68 +140,65 @@ impl Edit<'_> {
                 break;
             }
         }
-        let plain = self.plain.then(|| plain.medians()[2]);
+        let plain = self.plain.then(|| plain.medians().total);
         Ok(Cost { scratch: scratch.medians(), edit: edit.medians(), shares, gathers, plain, kept })
     }
 }
 
 impl Cost {
-    /// How much sooner the edited picture is there than one from nothing.
+    /// Time of a render from nothing over that of the edit.
     pub fn speed_up(&self) -> f64 {
-        self.scratch[2] / self.edit[2]
+        self.scratch.total / self.edit.total
     }
 
-    /// Seconds that the shares computed would take if they cost their part of the whole: of photons, and of segments.
+    /// Seconds that the edit would take if it cost the same share of each stage's time as of its items.
     pub fn due(&self) -> f64 {
-        self.due_for(self.shares[1])
+        self.due_for(self.shares.segments)
     }
 
-    fn due_for(&self, of_segments: f64) -> f64 {
-        self.shares[0] * self.scratch[0] + of_segments * self.scratch[1]
+    fn due_for(&self, share_of_segments: f64) -> f64 {
+        let PerStage { photons, segments } = self.scratch.stages;
+        self.shares.photons * photons + share_of_segments * segments
     }
 
-    /// The speed-up if nothing cost but these.
+    /// The speed-up if the edit took no longer than [`Self::due`].
     pub fn bound(&self) -> f64 {
-        (self.scratch[0] + self.scratch[1]) / self.due().max(1e-9)
+        self.scratch.stages.sum() / self.due().max(1e-9)
     }
 
-    /// The same, with each segment weighed by the places in it where photons are gathered.
+    /// The same, with each segment weighted by its number of gathers.
     pub fn bound_by_gathers(&self) -> f64 {
-        (self.scratch[0] + self.scratch[1]) / self.due_for(self.gathers).max(1e-9)
+        self.scratch.stages.sum() / self.due_for(self.gathers).max(1e-9)
     }
 }
 
-/// Seconds of the stages and of the whole, run by run.
+/// The times of several runs.
 #[derive(Default)]
-struct Times([Vec<f64>; 3]);
+struct Times(Vec<Seconds>);
 
 impl Times {
     fn add(&mut self, session: &Session, start: Instant) {
         let total = start.elapsed().as_secs_f64();
-        let [photons, segments] = STAGES.map(|stage| seconds(session, stage));
-        for (times, time) in self.0.iter_mut().zip([photons, segments, total]) {
-            times.push(time);
-        }
+        self.0.push(Seconds { stages: PerStage::by_name(|stage| seconds(session, stage)), total });
     }
 
-    fn medians(self) -> [f64; 3] {
-        self.0.map(median)
+    fn medians(self) -> Seconds {
+        let of = |time: fn(&Seconds) -> f64| median(self.0.iter().map(time).collect());
+        let stages =
+            PerStage { photons: of(|run| run.stages.photons), segments: of(|run| run.stages.segments) };
+        Seconds { stages, total: of(|run| run.total) }
     }
 }
-
-/// The stages of a photon mapper, which are its work items too.
-const STAGES: [&str; 2] = ["photons", "segments"];
 
 /// Seconds that a stage took since the last edit.
 pub fn seconds(session: &Session, stage: &str) -> f64 {
     session.spent().iter().find(|time| time.name == stage).map_or(0.0, |time| time.seconds)
 }
 
-/// Of photons and segments the shares computed since the last edit.
-fn computed(session: &Session) -> [f64; 2] {
+/// The shares of photons and segments computed since the last edit.
+fn computed(session: &Session) -> PerStage {
     let recomputed = session.recomputed();
-    let share = |name| recomputed.iter().find(|work| work.name == name).map_or(0.0, |work| work.share);
-    STAGES.map(share)
+    PerStage::by_name(|name| recomputed.iter().find(|work| work.name == name).map_or(0.0, |work| work.share))
 }
 
 /// Positions on view rays where photons were gathered since the last edit.

@@ -1,4 +1,4 @@
-//! How fast photons are gathered along view rays, and how well: the estimates against each other and against scalar code.
+//! Speed and error of gathering photons along view rays: the estimates against each other and against scalar code.
 
 use super::photon_scenes;
 use super::scenes::Bench;
@@ -12,7 +12,7 @@ use tyndall_live::document;
 
 const TABLE: &str = "gathering, default settings, one scattering; two threads";
 
-/// Least speed, over scalar gathers at every step, to an equal error.
+/// The least speed at equal error, over scalar gathers at every step.
 const OVER_SCALAR: f64 = 2.5;
 
 /// A thin medium between walls, and layers with empty space between.
@@ -34,7 +34,7 @@ fn scene(name: &str, bench: &Bench, effort: &Effort, level: Level) -> Result<Vec
     let truth = picture(&bench.render(&paths, level, effort.pick(256, 16)));
     let photons = effort.pick(1 << 20, 1 << 14);
     let least = Level::available().first().copied().unwrap_or(level);
-    // The first is what the others are to beat, at every step and without vector instructions.
+    // The first is the rival of the others: gathers at every step, without vector instructions.
     let ways = [
         ("point", least, 0.0),
         ("point", least, 1.5),

@@ -1,4 +1,4 @@
-//! How the cost grows with the work.
+//! How the time of `path` grows with the size of the problem.
 
 use super::Row;
 use super::scenes::{Bench, cloud};
@@ -7,7 +7,7 @@ use crate::Failure;
 use serde_json::{Value, json};
 use tyndall::simd::Level;
 
-/// Seconds of `path` on a cloud as one thing grows.
+/// Seconds of `path` on a cloud as one size grows.
 pub fn curves(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str =
         "growth: path on a cloud, two threads, 128 x 128, 4 samples, 8 scatterings unless told";
@@ -29,8 +29,8 @@ pub fn curves(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     for &lights in effort.pick(&[1, 10, 100, 1000][..], &[10]) {
         let lamp = |i: u32| {
             let angle = f64::from(i) * 2.399_963;
-            let place = [100.0 * angle.cos(), 60.0, 100.0 * angle.sin()];
-            json!({ "type": "sphere", "position": place, "radius": 2, "radiance": [500.0 / f64::from(lights), 0, 0] })
+            let position = [100.0 * angle.cos(), 60.0, 100.0 * angle.sin()];
+            json!({ "type": "sphere", "position": position, "radius": 2, "radiance": [500.0 / f64::from(lights), 0, 0] })
         };
         let lights: Vec<Value> = (0..lights).map(lamp).collect();
         measure(&bench, format!("lights {}", lights.len()), &json!({ "lights": lights }), 4)?;

@@ -1,5 +1,5 @@
-//! The figures of \[Jonsson12, sec. 6.2\] as tables: edits against the number of photons and of segments; and what the default
-//! settings come to.
+//! The figures of \[Jonsson12, sec. 6.2\] as tables: the cost of edits over the number of photons and of segments; and that of
+//! the default settings.
 
 use super::Row;
 use super::edit::{Against, Cost, Edit};
@@ -11,28 +11,45 @@ use crate::Failure;
 use serde_json::{Value, json};
 use tyndall::simd::Level;
 
-/// Seconds of patience for a point.
+/// See [`Edit::patience`].
 const PATIENCE: f64 = 2.0;
 
-fn vessels() -> Value {
-    tissue(&Tissue { vessels: COLD, ..Tissue::USUAL })
+/// The edit of a curve or table, and the scene that it edits.
+struct Case {
+    bench: Bench,
+    patch: Value,
+    steps_per_voxel: f64,
 }
 
-/// One point of a curve; the first of each is checked.
-fn point(
-    (bench, first): (&Bench, bool),
-    (name, before, patch): (&str, Value, Value),
-    effort: &Effort,
-    level: Level,
-) -> Result<Cost, Failure> {
-    let against = if first { Against::Equal } else { Against::First };
-    let edit = Edit { bench, before, patch, against, plain: false, patience: PATIENCE };
-    edit.measure(effort, level).map_err(|e| e.within(name))
+impl Case {
+    /// The Cornell box, its sphere recoloured.
+    fn cornell_box(effort: &Effort) -> Result<Self, Failure> {
+        Ok(Self { bench: photon_scenes::cornell_box(effort)?, patch: recoloured(), steps_per_voxel: 2.0 })
+    }
+
+    /// The CT-like volume, its vessels recoloured.
+    fn ct(effort: &Effort) -> Result<Self, Failure> {
+        let patch = tissue(&Tissue { vessels: COLD, ..Tissue::USUAL });
+        Ok(Self { bench: photon_scenes::ct(effort)?, patch, steps_per_voxel: 4.0 })
+    }
+
+    /// What the edit costs of the scene that `before` patches; `against` as of [`Edit`].
+    fn cost(&self, before: Value, against: Against, effort: &Effort, level: Level) -> Result<Cost, Failure> {
+        let (bench, patch) = (&self.bench, self.patch.clone());
+        Edit { bench, before, patch, against, plain: false, patience: PATIENCE }.measure(effort, level)
+    }
 }
 
-/// Speed-up of an edit by the number of light paths, for one scattering and two; `paper` says what it found where.
+/// What point `i` of a curve is compared with: the first picture is checked.
+fn against(i: usize) -> Against {
+    if i == 0 { Against::Equal } else { Against::First }
+}
+
+/// Speed-up of an edit over the number of light paths, for one scattering and two; `paper` gives the paper's speed-up at so many
+/// million photons.
 fn by_photons(
-    (table, bench, patch, samples): (&'static str, &Bench, &Value, f64),
+    table: &'static str,
+    case: &Case,
     paper: impl Fn(f64) -> Option<f64>,
     effort: &Effort,
     level: Level,
@@ -41,52 +58,46 @@ fn by_photons(
     for scatterings in [1, 2] {
         for (i, &millions) in effort.pick(&[0.5, 1.0, 2.1, 4.2][..], &[2.1]).iter().enumerate() {
             let name = format!("{scatterings} scattering(s), {millions} M photons");
-            let before = settings(effort, millions * 1e6, scatterings, 7, samples);
-            let cost = point((bench, i == 0), (&name, before, patch.clone()), effort, level)?;
+            let before = settings(effort, millions * 1e6, scatterings, 7, case.steps_per_voxel);
+            let cost = case.cost(before, against(i), effort, level).map_err(|e| e.within(&name))?;
             rows.push(
                 Row::new(table, name.clone(), "speed-up", "ratio", cost.speed_up()).beside(paper(millions)),
             );
-            rows.push(Row::new(table, name.clone(), "photons recomputed", "share", cost.shares[0]));
-            rows.push(Row::new(table, name.clone(), "segments recomputed", "share", cost.shares[1]));
-            rows.push(Row::new(table, name, "edit", "s", cost.edit[2]));
+            rows.push(Row::new(table, name.clone(), "photons recomputed", "share", cost.shares.photons));
+            rows.push(Row::new(table, name.clone(), "segments recomputed", "share", cost.shares.segments));
+            rows.push(Row::new(table, name, "edit", "s", cost.edit.total));
         }
     }
     Ok(rows)
 }
 
-/// Figure 7: the Cornell box's sphere in another colour.
+/// Figure 7: the Cornell box's sphere recoloured.
 pub fn figure_7(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str = "fig. 7: Cornell box, sphere recoloured, 7 segments, 2 samples per voxel";
-    let bench = photon_scenes::cornell_box(effort)?;
-    by_photons((TABLE, &bench, &recoloured(), 2.0), |_| Some(15.0), effort, level)
+    by_photons(TABLE, &Case::cornell_box(effort)?, |_| Some(15.0), effort, level)
 }
 
-/// Figure 8: the CT-like volume's vessels in another colour.
+/// Figure 8: the CT-like volume's vessels recoloured.
 pub fn figure_8(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str = "fig. 8: CT-like, vessels recoloured, 7 segments, 4 samples per voxel";
-    let bench = photon_scenes::ct(effort)?;
     // "When using more than 0.5 million photons."
     let paper = |millions: f64| (millions > 0.5).then_some(8.0);
-    by_photons((TABLE, &bench, &vessels(), 4.0), paper, effort, level)
+    by_photons(TABLE, &Case::ct(effort)?, paper, effort, level)
 }
 
-/// Figure 9: the same edits by the number of segments.
+/// Figure 9: the same edits over the number of segments.
 pub fn figure_9(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str = "fig. 9: time of an edit by segments per ray, 2.1 M photons, one scattering";
-    let scenes = [
-        ("Cornell box", photon_scenes::cornell_box(effort)?, recoloured(), 2.0),
-        ("CT-like", photon_scenes::ct(effort)?, vessels(), 4.0),
-    ];
     let mut rows = Vec::new();
-    for (scene, bench, patch, samples) in &scenes {
+    for (scene, case) in [("Cornell box", Case::cornell_box(effort)?), ("CT-like", Case::ct(effort)?)] {
         for (i, &segments) in effort.pick(&[1, 2, 4, 7, 10, 15, 20][..], &[1, 7]).iter().enumerate() {
             let name = format!("{scene}, {segments} segment(s)");
-            let before = settings(effort, 2.1e6, 1, segments, *samples);
-            let cost = point((bench, i == 0), (&name, before, patch.clone()), effort, level)?;
-            rows.push(Row::new(TABLE, name.clone(), "edit: photons", "s", cost.edit[0]));
-            rows.push(Row::new(TABLE, name.clone(), "edit: segments", "s", cost.edit[1]));
-            rows.push(Row::new(TABLE, name.clone(), "edit: total", "s", cost.edit[2]));
-            rows.push(Row::new(TABLE, name, "segments recomputed", "share", cost.shares[1]));
+            let before = settings(effort, 2.1e6, 1, segments, case.steps_per_voxel);
+            let cost = case.cost(before, against(i), effort, level).map_err(|e| e.within(&name))?;
+            rows.push(Row::new(TABLE, name.clone(), "edit: photons", "s", cost.edit.stages.photons));
+            rows.push(Row::new(TABLE, name.clone(), "edit: segments", "s", cost.edit.stages.segments));
+            rows.push(Row::new(TABLE, name.clone(), "edit: total", "s", cost.edit.total));
+            rows.push(Row::new(TABLE, name, "segments recomputed", "share", cost.shares.segments));
         }
     }
     Ok(rows)
@@ -95,18 +106,17 @@ pub fn figure_9(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
 /// The default settings on the CT-like volume: the first picture, a local edit, and what is kept in memory.
 pub fn defaults(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str = "default settings, CT-like; two threads";
-    /// Of a photon: place, direction and flux, as the paper's are.
+    /// Bytes of a photon's position, direction and flux, as in the paper.
     const BARE: f64 = 28.0;
-    let bench = photon_scenes::ct(effort)?;
     let few = json!({ "render": { "photon": { "photons": 1 << 14 } } });
     let before = effort.pick(json!({}), few);
     let name = "vessels recoloured";
-    let cost = point((&bench, true), (name, before, vessels()), effort, level)?;
+    let cost = Case::ct(effort)?.cost(before, Against::Equal, effort, level).map_err(|e| e.within(name))?;
     let mut rows = vec![
-        Row::new(TABLE, "first picture", "from the document", "s", cost.scratch[2]).at_most(3.0),
-        Row::new(TABLE, name, "photons recomputed", "share", cost.shares[0]),
-        Row::new(TABLE, name, "segments recomputed", "share", cost.shares[1]),
-        Row::new(TABLE, name, "edit", "s", cost.edit[2]).at_most(0.25),
+        Row::new(TABLE, "first picture", "from the document", "s", cost.scratch.total).at_most(3.0),
+        Row::new(TABLE, name, "photons recomputed", "share", cost.shares.photons),
+        Row::new(TABLE, name, "segments recomputed", "share", cost.shares.segments),
+        Row::new(TABLE, name, "edit", "s", cost.edit.total).at_most(0.25),
     ];
     for items in cost.kept {
         let each = items.bytes as f64 / items.count.max(1) as f64;

@@ -1,8 +1,8 @@
-//! The tables of \[Jonsson12, sec. 6.2\]: what edits cost when photons and view-ray segments survive them.
+//! The tables of \[Jonsson12, sec. 6.2\]: the cost of edits when photons and view-ray segments survive them.
 
 use super::Row;
-use super::edit::{Against, Cost, Edit};
-use super::photon_scenes::{self, COLD, Tissue, key, sphere};
+use super::edit::{Against, Cost, Edit, PerStage};
+use super::photon_scenes::{self, COLD, Layer, Tissue, key, sphere};
 use super::scenes::Bench;
 use super::timing::Effort;
 use crate::Failure;
@@ -13,37 +13,78 @@ use tyndall_live::document;
 /// A row of \[Jonsson12, table 1\]: seconds for photons and gathering without Historygrams and with them, the shares computed
 /// again, the overhead of setting up, and the speed-up.
 struct Paper {
-    without: [f64; 2],
-    with: [f64; 2],
-    shares: [f64; 2],
+    without: PerStage,
+    with: PerStage,
+    shares: PerStage,
     overhead: f64,
     speed_up: f64,
 }
 
-const HAND: Paper =
-    Paper { without: [0.22, 1.97], with: [0.10, 1.63], shares: [0.19, 0.29], overhead: 0.16, speed_up: 1.3 };
-const CORNELL: Paper =
-    Paper { without: [0.32, 9.11], with: [0.04, 0.57], shares: [0.03, 0.18], overhead: 0.26, speed_up: 15.2 };
-const ENGINE: Paper =
-    Paper { without: [0.37, 5.41], with: [0.10, 0.64], shares: [0.05, 0.19], overhead: 0.05, speed_up: 7.7 };
-const LADY_SKIN: Paper =
-    Paper { without: [0.37, 1.31], with: [0.25, 0.43], shares: [0.74, 0.24], overhead: 0.25, speed_up: 2.4 };
-const LADY_ALL: Paper =
-    Paper { without: [0.23, 1.32], with: [0.15, 1.11], shares: [0.71, 1.0], overhead: 0.03, speed_up: 1.2 };
-const VESSELS: Paper =
-    Paper { without: [0.11, 1.25], with: [0.03, 0.16], shares: [0.24, 0.04], overhead: 0.08, speed_up: 6.8 };
-const KIDNEY: Paper =
-    Paper { without: [0.11, 0.95], with: [0.07, 0.25], shares: [0.35, 0.09], overhead: 0.11, speed_up: 3.2 };
+const fn per_stage(photons: f64, segments: f64) -> PerStage {
+    PerStage { photons, segments }
+}
 
-/// Least part of the speed-up that the shares allow, and what an edit may cost beside its shares: their part by this factor, and
-/// this many seconds.
+const HAND: Paper = Paper {
+    without: per_stage(0.22, 1.97),
+    with: per_stage(0.10, 1.63),
+    shares: per_stage(0.19, 0.29),
+    overhead: 0.16,
+    speed_up: 1.3,
+};
+const CORNELL: Paper = Paper {
+    without: per_stage(0.32, 9.11),
+    with: per_stage(0.04, 0.57),
+    shares: per_stage(0.03, 0.18),
+    overhead: 0.26,
+    speed_up: 15.2,
+};
+const ENGINE: Paper = Paper {
+    without: per_stage(0.37, 5.41),
+    with: per_stage(0.10, 0.64),
+    shares: per_stage(0.05, 0.19),
+    overhead: 0.05,
+    speed_up: 7.7,
+};
+const LADY_SKIN: Paper = Paper {
+    without: per_stage(0.37, 1.31),
+    with: per_stage(0.25, 0.43),
+    shares: per_stage(0.74, 0.24),
+    overhead: 0.25,
+    speed_up: 2.4,
+};
+const LADY_ALL: Paper = Paper {
+    without: per_stage(0.23, 1.32),
+    with: per_stage(0.15, 1.11),
+    shares: per_stage(0.71, 1.0),
+    overhead: 0.03,
+    speed_up: 1.2,
+};
+const VESSELS: Paper = Paper {
+    without: per_stage(0.11, 1.25),
+    with: per_stage(0.03, 0.16),
+    shares: per_stage(0.24, 0.04),
+    overhead: 0.08,
+    speed_up: 6.8,
+};
+const KIDNEY: Paper = Paper {
+    without: per_stage(0.11, 0.95),
+    with: per_stage(0.07, 0.25),
+    shares: per_stage(0.35, 0.09),
+    overhead: 0.11,
+    speed_up: 3.2,
+};
+
+/// The least share of the allowed speed-up that an edit should reach.
 const OF_BOUND: f64 = 0.75;
-const LATENCY: (f64, f64) = (1.3, 0.06);
 
-/// Seconds of patience for a row.
+/// An edit should take at most this factor times [`Cost::due`], and [`LATENCY_SECONDS`] more.
+const LATENCY_FACTOR: f64 = 1.3;
+const LATENCY_SECONDS: f64 = 0.06;
+
+/// See [`Edit::patience`].
 const PATIENCE: f64 = 6.0;
 
-/// Light paths, scatterings, segments, samples per voxel: the parameters that the paper gives of each picture.
+/// The parameters that the paper gives for each picture: light paths, scatterings, segments of a ray, samples per voxel.
 pub fn settings(effort: &Effort, photons: f64, scatterings: u32, segments: u32, samples: f64) -> Value {
     let photons = (photons / effort.pick(1.0, 64.0)).round();
     let photon = json!({ "photons": photons, "segments": segments, "steps_per_voxel": samples });
@@ -57,16 +98,16 @@ fn row(table: &'static str, name: &str, cost: &Cost, paper: Option<&Paper>, want
     let seconds = |quantity, ours| Row::new(table, name, quantity, "s", ours);
     let ratio = |quantity, ours| Row::new(table, name, quantity, "ratio", ours);
     let share = |quantity, ours| Row::new(table, name, quantity, "share", ours);
-    let [photons, segments, total] = cost.scratch;
+    let Cost { scratch, edit, shares, .. } = cost;
     let mut rows = vec![
-        seconds("without: photons", photons).beside(of(&|p| p.without[0])),
-        seconds("without: segments", segments).beside(of(&|p| p.without[1])),
-        seconds("without: total", total).beside(of(&|p| p.without.iter().sum())),
-        seconds("with: photons", cost.edit[0]).beside(of(&|p| p.with[0])),
-        share("with: photons recomputed", cost.shares[0]).beside(of(&|p| p.shares[0])),
-        seconds("with: segments", cost.edit[1]).beside(of(&|p| p.with[1])),
-        share("with: segments recomputed", cost.shares[1]).beside(of(&|p| p.shares[1])),
-        seconds("with: total", cost.edit[2]).beside(of(&|p| p.with.iter().sum())),
+        seconds("without: photons", scratch.stages.photons).beside(of(&|p| p.without.photons)),
+        seconds("without: segments", scratch.stages.segments).beside(of(&|p| p.without.segments)),
+        seconds("without: total", scratch.total).beside(of(&|p| p.without.sum())),
+        seconds("with: photons", edit.stages.photons).beside(of(&|p| p.with.photons)),
+        share("with: photons recomputed", shares.photons).beside(of(&|p| p.shares.photons)),
+        seconds("with: segments", edit.stages.segments).beside(of(&|p| p.with.segments)),
+        share("with: segments recomputed", shares.segments).beside(of(&|p| p.shares.segments)),
+        seconds("with: total", edit.total).beside(of(&|p| p.with.sum())),
     ];
     let speed_up = ratio("speed-up", cost.speed_up()).beside(of(&|p| p.speed_up));
     rows.push(if let Some(wanted) = wanted { speed_up.at_least(wanted) } else { speed_up });
@@ -77,11 +118,10 @@ fn row(table: &'static str, name: &str, cost: &Cost, paper: Option<&Paper>, want
     rows.push(
         ratio("reached of what those allow", cost.speed_up() / cost.bound_by_gathers()).at_least(OF_BOUND),
     );
-    let (factor, beside) = LATENCY;
-    let due = factor * cost.due() + beside;
-    rows.push(ratio("latency over 1.3 x due + 60 ms", cost.edit[2] / due).at_most(1.0));
+    let allowed = LATENCY_FACTOR * cost.due() + LATENCY_SECONDS;
+    rows.push(ratio("latency over 1.3 x due + 60 ms", cost.edit.total / allowed).at_most(1.0));
     if let Some(plain) = cost.plain {
-        let overhead = share("set-up, over one segment a ray", total / plain - 1.0);
+        let overhead = share("set-up, over one segment a ray", scratch.total / plain - 1.0);
         rows.push(overhead.at_most(0.26).beside(of(&|p| p.overhead)));
     }
     rows
@@ -102,7 +142,7 @@ pub fn tissue(tissue: &Tissue) -> Value {
     json!({ "transfer_function": tissue.transfer() })
 }
 
-/// The Cornell box's sphere in another colour.
+/// The Cornell box's sphere gets another colour.
 pub fn cornell_box(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str =
         "table 1, Cornell box: nearest, one scattering, 7 segments, 2 samples per voxel; two threads";
@@ -120,14 +160,14 @@ pub fn cornell_box(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     Ok(rows)
 }
 
-/// The CT-like volume: colour and opacity of one thing in it, and two scatterings.
+/// The CT-like volume: colour and opacity of one of its layers, and two scatterings.
 pub fn ct(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str = "table 1, CT-like: 4 samples per voxel; two threads";
     let bench = photon_scenes::ct(effort)?;
     let usual = Tissue::USUAL;
     let vessels = tissue(&Tissue { vessels: COLD, ..usual });
-    let clear = tissue(&Tissue { bone: (usual.bone.0, 0.0), ..usual });
-    let bone = tissue(&Tissue { bone: (COLD, usual.bone.1), ..usual });
+    let clear = tissue(&Tissue { bone: Layer { opacity: 0.0, ..usual.bone }, ..usual });
+    let bone = tissue(&Tissue { bone: Layer { albedo: COLD, ..usual.bone }, ..usual });
     let (single, double) = (settings(effort, 1.6e6, 1, 7, 4.0), settings(effort, 2.1e6, 2, 10, 4.0));
     let cases = [
         ("vessels recoloured", single.clone(), vessels, VESSELS),
@@ -143,7 +183,7 @@ pub fn ct(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     Ok(rows)
 }
 
-/// Edits that touch much, or whose little is dear.
+/// Edits that touch most of the light, or little that is expensive.
 pub fn hard(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str = "table 1, hard edits, CT-like, one scattering; two threads";
     let bench = photon_scenes::ct(effort)?;

@@ -1,4 +1,4 @@
-//! `tyndall bench`: tables of what this machine does, as ratios measured by turns in one run wherever there is a rival.
+//! `tyndall bench`: tables of this machine's speed; where there is a rival, as ratios measured by turns in one run.
 
 mod core;
 mod edit;
@@ -18,20 +18,36 @@ use serde_json::{Value, json};
 
 /// One figure.
 pub struct Row {
-    /// The table that it belongs to.
+    /// Title of its table.
     pub table: &'static str,
-    /// What was measured.
+    /// The case that was measured.
     pub row: String,
-    /// Which property of it.
+    /// The quantity that was measured.
     pub quantity: &'static str,
     /// The figure's unit; "ratio" has none.
     pub unit: &'static str,
-    /// What was found.
+    /// What was measured here.
     pub ours: f64,
-    /// At least (positive) or at most (negative) this much is aimed at.
-    pub floor: Option<f64>,
-    /// What the paper found that the table is from, on its machine and data.
+    /// What the figure should be.
+    pub target: Option<Target>,
+    /// The paper's figure, on its machine and data.
     pub paper: Option<f64>,
+}
+
+/// What a figure should be.
+#[derive(Clone, Copy)]
+pub enum Target {
+    AtLeast(f64),
+    AtMost(f64),
+}
+
+impl Target {
+    fn is_met_by(self, figure: f64) -> bool {
+        match self {
+            Self::AtLeast(floor) => figure >= floor,
+            Self::AtMost(ceiling) => figure <= ceiling,
+        }
+    }
 }
 
 impl Row {
@@ -43,32 +59,32 @@ impl Row {
         unit: &'static str,
         ours: f64,
     ) -> Self {
-        Self { table, row: row.into(), quantity, unit, ours, floor: None, paper: None }
+        Self { table, row: row.into(), quantity, unit, ours, target: None, paper: None }
     }
 
-    /// Asked to be at least so much.
+    /// With the target of at least so much.
     pub fn at_least(mut self, floor: f64) -> Self {
-        self.floor = Some(floor);
+        self.target = Some(Target::AtLeast(floor));
         self
     }
 
-    /// Asked to be at most so much.
+    /// With the target of at most so much.
     pub fn at_most(mut self, ceiling: f64) -> Self {
-        self.floor = Some(-ceiling);
+        self.target = Some(Target::AtMost(ceiling));
         self
     }
 
-    /// With what the paper found.
+    /// Beside the paper's figure.
     pub fn beside(mut self, paper: Option<f64>) -> Self {
         self.paper = paper;
         self
     }
 
     fn target(&self) -> String {
-        match self.floor {
+        match self.target {
             None => String::new(),
-            Some(floor) if floor >= 0.0 => format!(">= {floor}"),
-            Some(ceiling) => format!("<= {}", -ceiling),
+            Some(Target::AtLeast(floor)) => format!(">= {floor}"),
+            Some(Target::AtMost(ceiling)) => format!("<= {ceiling}"),
         }
     }
 
@@ -83,12 +99,8 @@ impl Row {
     fn markdown(&self) -> String {
         let Self { row, quantity, unit, ours, paper, .. } = self;
         let paper = paper.map_or(String::new(), |paper| paper.to_string());
-        let missed = match self.floor {
-            Some(floor) if floor >= 0.0 => *ours < floor,
-            Some(ceiling) => *ours > -ceiling,
-            None => false,
-        };
-        let ours = if missed { format!("**{ours:.3}**") } else { format!("{ours:.3}") };
+        let met = self.target.is_none_or(|target| target.is_met_by(*ours));
+        let ours = if met { format!("{ours:.3}") } else { format!("**{ours:.3}**") };
         format!("| {row} | {quantity} | {ours} | {unit} | {} | {paper} |\n", self.target())
     }
 
@@ -100,13 +112,13 @@ impl Row {
     }
 }
 
-/// A table for the documentation; figures that miss their target are bold.
+/// A table for the documentation; a figure that misses its target is bold.
 fn markdown(title: &str, rows: &[Row]) -> String {
     let head = "| row | quantity | ours | unit | target | paper |\n| --- | --- | --- | --- | --- | --- |\n";
     format!("\n### {title}\n\n{head}{}", rows.iter().map(Row::markdown).collect::<String>())
 }
 
-/// Measures the rows of one table with certain vector instructions.
+/// Measures the rows of one table with the given vector instructions.
 type Table = fn(&timing::Effort, tyndall::simd::Level) -> Result<Vec<Row>, Failure>;
 
 const CORE: &[Table] = &[
@@ -131,7 +143,7 @@ const HISTORYGRAMS: &[Table] = &[
     samples::edits,
 ];
 
-/// Runs the tables and prints each as soon as it is there, or all as JSON.
+/// Measures the tables and prints each as soon as it is complete, or all at the end as JSON.
 pub fn run(options: &BenchOptions) -> Result<(), Failure> {
     let level = crate::machine::vector_instructions()?;
     let effort = timing::Effort::new(options.quick);

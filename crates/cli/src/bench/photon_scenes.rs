@@ -9,7 +9,7 @@ use tyndall::volume::procedural::MATERIALS;
 /// Two threads render: the sessions take all that a small machine has.
 const THREADS: usize = 2;
 
-/// A colour of the layer or the thing that is edited, before and after.
+/// Albedo of the edited layer or object before the edit, and after it.
 pub const WARM: [f64; 3] = [0.85, 0.2, 0.15];
 pub const COLD: [f64; 3] = [0.2, 0.35, 0.9];
 
@@ -17,7 +17,7 @@ fn point(value: f64, opacity: f64, albedo: [f64; 3]) -> Value {
     json!({ "value": value, "opacity": opacity, "albedo": albedo })
 }
 
-/// The volume's side in voxels: that of the paper's Cornell box, or what shows that it works.
+/// The volume's side in voxels: that of the paper's Cornell box, or less for a quick run.
 pub fn side(effort: &Effort) -> u32 {
     effort.pick(256, 64)
 }
@@ -58,7 +58,7 @@ pub fn sphere(color: [f64; 3]) -> Value {
     };
     let piece = |material: &tyndall::volume::procedural::Material| {
         let (name, value) = (material.name, f64::from(material.value));
-        // Half an eighth to either side, where it jumps to the neighbour.
+        // Constant for half an eighth to either side; there it jumps to its neighbour.
         [-0.0625, 0.0625].map(|to| point(value + to, opacity(name), albedo(name)))
     };
     json!({ "points": MATERIALS.iter().flat_map(piece).collect::<Vec<_>>() })
@@ -69,23 +69,34 @@ pub fn sphere(color: [f64; 3]) -> Value {
 pub struct Tissue {
     /// Opacity of the outermost layer.
     pub skin: f64,
-    /// Colour and opacity of the shell around the vessels.
-    pub bone: ([f64; 3], f64),
-    /// Colour of the innermost matter.
+    /// The shell around the vessels.
+    pub bone: Layer,
+    /// Albedo of the innermost matter.
     pub vessels: [f64; 3],
-    /// Its mirror-likeness, as a surface; `None` where it is a cloud like the rest.
+    /// Roughness of the vessels' surface; `None` where they have no surface, like the rest.
     pub roughness: Option<f64>,
 }
 
-impl Tissue {
-    /// Thin skin and bone, through which vessels show.
-    pub const USUAL: Self =
-        Self { skin: 0.01, bone: ([0.95, 0.92, 0.85], 0.06), vessels: WARM, roughness: None };
+/// A band of the transfer function.
+#[derive(Clone, Copy)]
+pub struct Layer {
+    pub albedo: [f64; 3],
+    pub opacity: f64,
+}
 
-    /// The transfer function: bands of the eighths that the shells have for values, clear between.
+impl Tissue {
+    /// Thin skin and bone, with the vessels visible through them.
+    pub const USUAL: Self = Self {
+        skin: 0.01,
+        bone: Layer { albedo: [0.95, 0.92, 0.85], opacity: 0.06 },
+        vessels: WARM,
+        roughness: None,
+    };
+
+    /// The transfer function: a band around each value of the shells, which are multiples of an eighth; clear in between.
     pub fn transfer(&self) -> Value {
         let skin = [0.9, 0.7, 0.6];
-        let (bone, dense) = self.bone;
+        let Layer { albedo: bone, opacity: dense } = self.bone;
         let mut points = vec![
             point(0.02, 0.0, skin),
             point(0.1, self.skin, skin),
@@ -109,8 +120,7 @@ impl Tissue {
     }
 }
 
-/// A volume of nested layers with much empty space between, in place of the paper's CT scans: skin, bone, and at the core the
-/// vessels.
+/// Nested layers with much empty space between them, instead of the paper's CT scans: skin, bone, and the vessels at the core.
 pub fn ct(effort: &Effort) -> Result<Bench, Failure> {
     let voxels = side(effort);
     let value = json!({
@@ -125,7 +135,7 @@ pub fn ct(effort: &Effort) -> Result<Bench, Failure> {
     Bench::new(value, THREADS)
 }
 
-/// A lamp far away.
+/// A directional light.
 pub fn key(direction: [f64; 3]) -> Value {
     json!({ "type": "directional", "direction": direction, "irradiance": [3, 3, 3] })
 }

@@ -1,9 +1,9 @@
-//! What edits of path-traced pictures cost when samples survive them \[Jonsson12, sec. 7\].
+//! The cost of edits of path-traced pictures when samples survive them \[Jonsson12, sec. 7\].
 
 use super::Row;
 use super::edit::{bits, check};
 use super::historygrams::{recoloured, tissue};
-use super::photon_scenes::{self, COLD, Tissue};
+use super::photon_scenes::{self, COLD, Layer, Tissue};
 use super::scenes::Bench;
 use super::timing::{Effort, median};
 use crate::Failure;
@@ -17,19 +17,23 @@ use tyndall_live::document;
 /// Samples of each pixel.
 const SAMPLES: u32 = 16;
 
-/// What an edit took, in seconds.
+/// What an edit cost; times are medians, in seconds.
 struct Cost {
-    /// From nothing, without histories and with them.
-    scratch: [f64; 2],
-    /// To one sample of each pixel, and to all.
-    edit: [f64; 2],
-    /// Of the samples the share that was taken again.
+    /// A render of the edited scene from nothing that keeps no samples.
+    without_histories: f64,
+    /// One that keeps them.
+    with_histories: f64,
+    /// The edit, to one sample in each pixel.
+    edit_to_one: f64,
+    /// The edit, to all samples.
+    edit_to_all: f64,
+    /// The share of the samples that were taken again.
     share: f64,
-    /// Bytes of a sample.
+    /// Bytes of a kept sample.
     bytes: f64,
 }
 
-/// Renders a scene from nothing, keeping its samples in so many bytes.
+/// Renders a scene from nothing and keeps its samples in at most so many bytes.
 fn render(bench: &Bench, patch: &Value, level: Level, bytes: usize) -> Result<Session, Failure> {
     let resources = Resources { level, edit_memory: bytes };
     let mut session = Session::with_resources(bench.scene(patch)?, bench.threads().clone(), resources);
@@ -48,7 +52,7 @@ fn cost(
     const BYTES: usize = 1 << 30;
     let after = document::apply(before, patch);
     let mut live = render(bench, before, level, BYTES)?;
-    let (mut scratch, mut edit) = ([(); 2].map(|()| Vec::new()), [(); 2].map(|()| Vec::new()));
+    let (mut without, mut with, mut to_one, mut to_all) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut share = 0.0;
     for round in 0..effort.rounds.min(3) {
         if round > 0 {
@@ -57,13 +61,13 @@ fn cost(
         }
         let begun = Instant::now();
         let fresh = render(bench, &after, level, 0)?;
-        scratch[0].push(begun.elapsed().as_secs_f64());
+        without.push(begun.elapsed().as_secs_f64());
         let begun = Instant::now();
         drop(render(bench, &after, level, BYTES)?);
-        scratch[1].push(begun.elapsed().as_secs_f64());
+        with.push(begun.elapsed().as_secs_f64());
         let begun = Instant::now();
         live.set_scene(bench.scene(&after)?);
-        for (samples, times) in [1, SAMPLES].into_iter().zip(&mut edit) {
+        for (samples, times) in [(1, &mut to_one), (SAMPLES, &mut to_all)] {
             live.refine(&Budget::samples(samples));
             times.push(begun.elapsed().as_secs_f64());
         }
@@ -72,7 +76,14 @@ fn cost(
     }
     let [samples] = live.report().kept[..] else { return Err(Failure::input("nothing is kept")) };
     let bytes = samples.bytes as f64 / samples.count as f64;
-    Ok(Cost { scratch: scratch.map(median), edit: edit.map(median), share, bytes })
+    Ok(Cost {
+        without_histories: median(without),
+        with_histories: median(with),
+        edit_to_one: median(to_one),
+        edit_to_all: median(to_all),
+        share,
+        bytes,
+    })
 }
 
 /// Edits of colour, of opacity, and of all that scatters.
@@ -81,8 +92,8 @@ pub fn edits(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     let (room, ct) = (photon_scenes::cornell_box(effort)?, photon_scenes::ct(effort)?);
     let usual = Tissue::USUAL;
     let vessels = tissue(&Tissue { vessels: COLD, ..usual });
-    let bone = tissue(&Tissue { bone: (COLD, usual.bone.1), ..usual });
-    let clear = tissue(&Tissue { bone: (usual.bone.0, 0.0), ..usual });
+    let bone = tissue(&Tissue { bone: Layer { albedo: COLD, ..usual.bone }, ..usual });
+    let clear = tissue(&Tissue { bone: Layer { opacity: 0.0, ..usual.bone }, ..usual });
     let all = json!({ "medium": { "phase": { "type": "henyey-greenstein", "g": 0.3 } } });
     let cases = [
         ("Cornell box, sphere recoloured, 1", &room, recoloured(), 1),
@@ -95,17 +106,17 @@ pub fn edits(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     let mut rows = Vec::new();
     for (name, bench, patch, scatterings) in cases {
         let before = json!({ "render": { "integrator": "path", "max_scatter": scatterings } });
-        let Cost { scratch: [without, with], edit: [first, whole], share, bytes } =
-            cost(effort, level, bench, &before, &patch).map_err(|e| e.within(name))?;
+        let cost = cost(effort, level, bench, &before, &patch).map_err(|e| e.within(name))?;
+        let Cost { without_histories: without, share, .. } = cost;
         let row = |quantity, unit, ours| Row::new(TABLE, name, quantity, unit, ours);
         rows.extend([
             row("from nothing, without histories", "s", without),
-            row("set-up", "share", with / without - 1.0).at_most(0.26),
-            row("bytes of a sample", "bytes", bytes),
+            row("set-up", "share", cost.with_histories / without - 1.0).at_most(0.26),
+            row("bytes of a sample", "bytes", cost.bytes),
             row("samples taken again", "share", share),
-            row("edit, to the first sample", "s", first),
-            row("edit, to all samples", "s", whole),
-            row("speed-up", "ratio", without / whole),
+            row("edit, to the first sample", "s", cost.edit_to_one),
+            row("edit, to all samples", "s", cost.edit_to_all),
+            row("speed-up", "ratio", without / cost.edit_to_all),
             row("speed-up that the share allows", "ratio", 1.0 / share),
         ]);
     }

@@ -1,4 +1,4 @@
-//! What an edit costs before light is computed: from the patch to the scene, and to the first sample.
+//! The cost of an edit before light is computed: from the patch to the scene, and to the first sample.
 
 use super::Row;
 use super::scenes::ct;
@@ -11,14 +11,14 @@ use std::time::Instant;
 use tyndall::simd::Level;
 use tyndall_live::{Budget, Input, LiveSession, Options};
 
-/// Milliseconds from the scene to the first sample begun: what the method voids, and the film that begins anew.
+/// Target in milliseconds from the scene to the first sample: discarding what the method kept, and clearing the film.
 const TO_SAMPLE: f64 = 5.0;
 
-/// An edit that goes back and forth between two patches.
+/// An edit that alternates between two patches.
 struct Case {
     name: &'static str,
     patches: [Value; 2],
-    /// Milliseconds from patch to scene that are asked for.
+    /// Target in milliseconds, from the patch to the scene.
     target: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! The scenes that are measured, all generated.
+//! The measured scenes, all generated.
 
 use crate::Failure;
 use serde_json::{Value, json};
@@ -37,7 +37,7 @@ pub fn cloud(voxels: u32) -> Value {
     })
 }
 
-/// A document with its volume, from which scenes that differ in other keys are made without reading it again.
+/// A document with its volume, from which scenes are built that differ in other keys.
 pub struct Bench {
     value: Value,
     assets: Assets,
@@ -45,7 +45,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Makes the volume.
+    /// Generates the volume.
     pub fn new(value: Value, threads: usize) -> Result<Self, Failure> {
         let threads = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map(Arc::new);
         let threads = threads.map_err(|e| Failure::input(format!("threads: {e}")))?;
@@ -55,7 +55,7 @@ impl Bench {
         Ok(Self { value, assets, threads })
     }
 
-    /// The scene with a patch laid over it.
+    /// The scene of the patched document.
     pub fn scene(&self, patch: &Value) -> Result<Scene, Failure> {
         let document = Document::from_value(document::apply(&self.value, patch)).map_err(Failure::input)?;
         let built = Built::new(document, self.assets.clone(), &self.threads);

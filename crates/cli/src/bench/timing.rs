@@ -1,27 +1,27 @@
-//! Clocks: medians of several runs, and ratios of runs by turns, since a shared machine changes from minute to minute.
+//! Clocks: medians of several runs; rivals run by turns, since the speed of a shared machine changes from minute to minute.
 
 use std::time::Instant;
 
 /// How much is measured.
 pub struct Effort {
-    /// Runs of which the median counts.
+    /// Runs, of which the median is reported.
     pub rounds: usize,
     /// Whether sizes are reduced.
     pub quick: bool,
 }
 
 impl Effort {
-    /// The whole, or what shows that it works.
+    /// All rounds at full size, or one round at reduced size to show that it works.
     pub fn new(quick: bool) -> Self {
         Self { rounds: if quick { 1 } else { 5 }, quick }
     }
 
-    /// The first for the whole, the second for the quick run.
+    /// The first for a whole run, the second for a quick one.
     pub fn pick<T>(&self, whole: T, quick: T) -> T {
         if self.quick { quick } else { whole }
     }
 
-    /// Median seconds of each of several ways, which take turns; one more round before warms up.
+    /// Median seconds of each of several ways, which take turns after a round that warms up.
     pub fn by_turns(&self, ways: &mut [&mut dyn FnMut()]) -> Vec<f64> {
         let mut times = vec![Vec::new(); ways.len()];
         for round in 0..=self.rounds {
