@@ -301,7 +301,7 @@ fn a_place_that_takes_no_file_is_refused_before_the_work() {
         ("a.bmp", ".png"),
         ("a", ".png"),
         ("..", ".png"),
-        ("../scene.toml/a.png", "is no folder"),
+        ("../scene.toml/a.png", "is not a folder"),
         ("../folder.png", "it is a folder"),
     ] {
         let files = vec![("scene.toml", SCENE.into()), ("folder.png/file", Vec::new())];

@@ -5,18 +5,18 @@ use std::io::{Error, ErrorKind, Result, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Unfinished files, which must not outlive the process. Held while one appears, is moved or goes.
+/// Unfinished files, which must not outlive the process. Locked while one is created, moved or removed.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Puts `bytes` at `path`: written to a file beside it first, then moved over what was there. A device or a pipe gets
-/// the bytes themselves.
+/// Writes `bytes` to `path`: first to a file beside it, which then replaces what was there. A device or a pipe is
+/// written to directly.
 ///
 /// # Errors
-/// What the system says; nothing half-written is left behind.
+/// The system's error; no half-written file is left behind.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
     let path = match destination(path)? {
         Destination::File(path) => path,
-        // Nothing is cut off that stands there already: it may be a log.
+        // Appended, because existing content must not be truncated: it may be a log.
         Destination::Stream => return OpenOptions::new().append(true).open(path)?.write_all(bytes),
     };
     let (beside, mut file) = create_beside(&path)?;
@@ -26,7 +26,7 @@ pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
     unfinished.retain(|other| *other != beside);
     let moved = written.and_then(|()| fs::rename(&beside, &path));
     if moved.is_err() {
-        // The first failure is the one to tell; a file that cannot be removed either is at least not the picture.
+        // The first failure is reported; a leftover that cannot be removed is at least not at `path`.
         drop(fs::remove_file(&beside));
     }
     moved
@@ -35,9 +35,9 @@ pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
 /// Whether [`replace`] could put a file at `path`; leaves nothing behind.
 ///
 /// # Errors
-/// What the system or a look at the place says against it.
+/// Why not: the system's error, or what is already at `path`.
 pub fn check(path: &Path) -> Result<()> {
-    // A stream is not opened to see: that could wait for the one who reads it.
+    // A stream is not opened as a test: opening a pipe can block until it has a reader.
     let Destination::File(path) = destination(path)? else { return Ok(()) };
     let (beside, file) = create_beside(&path)?;
     drop(file);
@@ -46,32 +46,32 @@ pub fn check(path: &Path) -> Result<()> {
     fs::remove_file(beside)
 }
 
-/// Removes every unfinished file. While the returned value lives, no other appears and none is finished, so that the
+/// Removes every unfinished file. While the returned value is held, no file is created or finished, so that the
 /// process can end without leaving one behind.
-#[must_use = "files appear again when it is dropped"]
+#[must_use = "files can be created again once it is dropped"]
 pub fn abandon() -> impl Drop {
     let mut unfinished = unfinished();
     for beside in unfinished.drain(..) {
-        // The process is about to end; there is nobody to tell.
+        // The process is about to end; there is nobody to report an error to.
         drop(fs::remove_file(beside));
     }
     unfinished
 }
 
 fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
-    // A list of paths is whole at all times.
+    // A list of paths stays valid even if another thread panics.
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What stands where bytes shall go.
+/// What is at the path to write to.
 enum Destination {
     /// A file, or nothing yet.
     File(PathBuf),
-    /// A device or a pipe, or whatever stands behind `/dev/stdout`.
+    /// A device or a pipe, or whatever `/dev/stdout` refers to.
     Stream,
 }
 
-/// Where the bytes go: through links, and never over a folder, a disk or a protected file.
+/// Where the bytes go. Follows links; refuses folders, disks and write-protected files.
 fn destination(path: &Path) -> Result<Destination> {
     let about = match path.metadata() {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Destination::File(path.to_owned())),
@@ -120,7 +120,7 @@ fn create_beside(path: &Path) -> Result<(PathBuf, File)> {
     Err(Error::new(ErrorKind::AlreadyExists, "the folder is full of unfinished pictures"))
 }
 
-/// The folder that a file lies in.
+/// The folder that contains a file.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
@@ -143,7 +143,7 @@ mod tests {
         let ending = abandon();
         assert!(names(folder.path()).is_empty());
 
-        // Who writes meanwhile waits.
+        // A writer has to wait meanwhile.
         let place = folder.path().join("b.png");
         let writer = std::thread::spawn(move || replace(&place, b"whole"));
         std::thread::sleep(std::time::Duration::from_millis(50));
@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     #[cfg(target_os = "linux")]
-    fn a_device_takes_the_bytes_itself() {
+    fn a_device_is_written_to_directly() {
         assert!(check(Path::new("/dev/null")).is_ok() && replace(Path::new("/dev/null"), b"text").is_ok());
         assert!(!fs::metadata("/dev/null").unwrap().is_file());
         let error = replace(Path::new("/dev/full"), b"text").unwrap_err();

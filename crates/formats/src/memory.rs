@@ -1,6 +1,6 @@
-//! How much memory is left, so that a volume that cannot fit is refused instead of ending the process.
+//! How much memory is left, so that a volume too large to fit is refused instead of ending the process.
 
-/// Bytes that can be had without swapping; `None` where the system does not say.
+/// Bytes that can be allocated without swapping; `None` where the system does not report it.
 #[must_use]
 pub fn available() -> Option<u64> {
     let system =
@@ -8,7 +8,7 @@ pub fn available() -> Option<u64> {
     Some(container().map_or(system, |limit| limit.min(system)))
 }
 
-/// What the process's control group has left, where one limits it.
+/// Bytes left to the process's control group, where one limits it.
 fn container() -> Option<u64> {
     let number = |name: &str| {
         std::fs::read_to_string(format!("/sys/fs/cgroup/{name}")).ok()?.trim().parse::<u64>().ok()
@@ -21,7 +21,7 @@ fn container() -> Option<u64> {
     Some(number("memory.max")?.saturating_sub(used))
 }
 
-/// The number after a name at the beginning of a line.
+/// The number after `name`, on the line that begins with it.
 fn field(text: &str, name: &str) -> Option<u64> {
     let mut lines = text.lines().map(str::split_whitespace);
     lines.find_map(|mut words| (words.next() == Some(name)).then(|| words.next()?.parse().ok())?)

@@ -1,5 +1,5 @@
-//! Damaged files of every kind give an error or a volume: no panic, no endless loop, no memory that the
-//! file does not hold. The damage is the same in every run.
+//! Damaged files of every kind give an error or a volume: no panic, no endless loop, no more memory than
+//! the file justifies. The damage is the same in every run.
 
 use flate2::{Compression, write::GzEncoder, write::ZlibEncoder};
 use std::io::Write;
@@ -107,7 +107,7 @@ fn a_file_cut_anywhere_is_refused() {
         let path = folder.path().join(name);
         for length in 0..bytes.len() {
             let read = try_reading(&path, &bytes[..length]);
-            // The blank after the last word may be missing.
+            // The space after the last word may be missing.
             let complete = name.starts_with("ascii") && length + 1 >= bytes.len();
             assert!(!read || complete, "{name} cut to {length} of {} bytes was read", bytes.len());
         }
@@ -156,7 +156,7 @@ fn scrambled_files_give_an_error_or_a_volume() {
 }
 
 #[test]
-fn a_raw_file_of_any_length_is_refused_unless_it_suffices() {
+fn a_raw_file_is_refused_unless_it_is_long_enough() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.raw");
     let layout = RawLayout {
@@ -173,16 +173,16 @@ fn a_raw_file_of_any_length_is_refused_unless_it_suffices() {
     }
 }
 
-/// NRRD whose samples are what is given, in that encoding, of that size.
+/// An NRRD file with the given encoding, sizes and encoded samples.
 fn packed(encoding: &str, sizes: &str, data: &[u8]) -> Vec<u8> {
     let head = format!("NRRD0004\ntype: uchar\ndimension: 3\nsizes: {sizes}\nencoding: {encoding}\n\n");
     [head.as_bytes(), data].concat()
 }
 
-/// What asks for little of a stream that unpacks to much gets little; what asks for more than a stream can hold is
-/// refused before it is unpacked.
+/// A header that needs only the beginning of a long stream costs only that; one that needs more than the stream can
+/// hold is refused before decompression.
 #[test]
-fn a_packed_gibibyte_costs_no_more_than_is_asked_of_it() {
+fn a_compressed_gibibyte_costs_no_more_than_is_read_of_it() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.nrrd");
     let zeros = vec![0; 1 << 26];
@@ -194,7 +194,7 @@ fn a_packed_gibibyte_costs_no_more_than_is_asked_of_it() {
         let error = within_limits(|| read(&path)).unwrap_err().to_string();
         assert!(error.contains("cannot hold") || error.contains("bytes of memory"), "{error}");
     }
-    // A gibibyte, of which the stream holds a sixteenth.
+    // The header states a gibibyte; the stream holds a sixteenth of it.
     std::fs::write(&path, packed("gzip", "1024 1024 1024", &gzip(&zeros))).unwrap();
     let error = within_limits(|| read(&path)).unwrap_err().to_string();
     assert!(error.contains("cannot hold"), "{error}");
@@ -211,7 +211,7 @@ fn a_header_of_many_lines_is_read_in_one_go() {
 }
 
 #[test]
-fn names_of_slices_are_counted_before_they_are_made() {
+fn names_of_slices_are_counted_before_they_are_built() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.nhdr");
     for range in ["0 16777215 1", "0 -9223372036854775808 -1"] {

@@ -1,9 +1,9 @@
-//! Random damage to valid files of every kind that is read: an answer or an error, never a panic, a hang, or memory
-//! that the file does not hold.
+//! Random damage to valid files of every kind that is read: the result is a value or an error, never a panic, a hang,
+//! or more memory than the file justifies.
 //!
-//! By default each runs for two seconds; `BOLERO_RANDOM_TEST_TIME_MS` makes it longer. A failure prints the smallest
-//! damage that shows it and a seed, with which `BOLERO_RANDOM_SEED` shows it again. Where the whole process ends, the
-//! file that did it stays in the temporary folder, below `tyndall-fuzz-...`.
+//! By default each test runs for two seconds; `BOLERO_RANDOM_TEST_TIME_MS` makes it longer. A failure prints the
+//! smallest damage that causes it and a seed, with which `BOLERO_RANDOM_SEED` reproduces it. If the whole process
+//! dies, the file that caused it stays in the temporary folder, below `tyndall-fuzz-...`.
 
 mod valid;
 
@@ -15,10 +15,10 @@ use tyndall_formats::volume::{Endian, Loaded, RawLayout, ReadError, SampleType, 
 use tyndall_testing::damage::Edit;
 use tyndall_testing::within_limits;
 
-/// How long each runs unless the environment says otherwise.
+/// How long each test runs unless the environment says otherwise.
 const USUALLY: Duration = Duration::from_secs(2);
 
-/// A file of a list, damaged; some are compressed after that, so that the damage lies within.
+/// A damaged file from a list; some are compressed afterwards, so that the damage is in the decompressed data.
 #[derive(Debug, TypeGenerator)]
 struct Damaged {
     file: u8,
@@ -28,7 +28,7 @@ struct Damaged {
 }
 
 impl Damaged {
-    /// Puts the file in the folder and returns its place.
+    /// Writes the damaged file to the folder and returns its path.
     fn put(&self, files: &[(&str, Vec<u8>)], words: &[&str], folder: &Path) -> PathBuf {
         let (name, bytes) = &files[usize::from(self.file) % files.len()];
         let mut bytes = bytes.clone();
@@ -41,18 +41,18 @@ impl Damaged {
         path
     }
 
-    /// Puts the file back as it was.
+    /// Restores the undamaged file.
     fn mend(&self, files: &[(&str, Vec<u8>)], path: &Path) {
         rewrite(path, &files[usize::from(self.file) % files.len()].1);
     }
 }
 
-/// A folder that vanishes at the test's end.
+/// A folder that is deleted at the end of the test.
 fn folder() -> tempfile::TempDir {
     tempfile::Builder::new().prefix("tyndall-fuzz-").tempdir().expect("a folder")
 }
 
-/// Writes a file anew; writing over it instead can make the file system wait for the disk each time.
+/// Deletes and rewrites a file; overwriting it in place can make the file system wait for the disk each time.
 fn rewrite(path: &Path, bytes: &[u8]) {
     if path.exists() {
         std::fs::remove_file(path).expect("the last file can go");
@@ -60,7 +60,7 @@ fn rewrite(path: &Path, bytes: &[u8]) {
     std::fs::write(path, bytes).expect("a new file");
 }
 
-/// Damages the files, one at a time, and hands them on.
+/// Damages the files, one at a time, and calls `try_file` on each.
 fn for_damaged(files: &[(&str, Vec<u8>)], words: &[&str], try_file: impl Fn(&Path)) {
     let folder = folder();
     let folder = folder.path();
@@ -71,20 +71,20 @@ fn for_damaged(files: &[(&str, Vec<u8>)], words: &[&str], try_file: impl Fn(&Pat
     check!().with_type::<Damaged>().with_test_time(USUALLY).with_iterations(usize::MAX).for_each(|damaged| {
         let path = damaged.put(files, words, folder);
         within_limits(|| try_file(&path));
-        // Others of the folder may name it.
+        // Other files of the folder may refer to it.
         damaged.mend(files, &path);
     });
 }
 
-/// A message fit to be read, which names the file, or the other one of its pair.
+/// Asserts that the message is readable and names the file, or the other one of its pair.
 fn helpful(error: &dyn std::fmt::Display, path: &Path) {
     let message = error.to_string();
     let name = path.file_stem().expect("a name").to_string_lossy();
-    assert!(message.contains(&*name), "{message:?} names no {name}");
+    assert!(message.contains(&*name), "{message:?} does not name {name}");
     assert!(message.len() < 2000 && !message.chars().any(char::is_control), "{message:?}");
 }
 
-/// What a loaded volume must be for the renderer to take it.
+/// Asserts what the renderer requires of a loaded volume.
 fn sound(read: Result<Loaded, ReadError>, path: &Path) {
     match read {
         Ok(Loaded { volume, .. }) => {

@@ -1,4 +1,4 @@
-//! Pictures written and read back, each kind by a reader of its own; and what broken files and places answer.
+//! Pictures written and read back, each kind by an independent reader; errors of broken files and destinations.
 
 use std::fs;
 use std::io::Cursor;
@@ -14,7 +14,7 @@ mod common;
 const DISPLAY: Display = Display { tone: ToneCurve::Agx, exposure: 0.5 };
 const KINDS: [&str; 6] = ["png", "jpg", "JPEG", "tif", "TIFF", "exr"];
 
-/// Every pixel another colour, opacity and layer value.
+/// Every pixel has a different colour, opacity and layer values.
 fn picture(transparent: bool) -> Picture {
     let pixels = || (0..12_u8).map(f32::from);
     Picture {
@@ -94,7 +94,7 @@ fn exr_holds_every_layer_exactly_in_one_part() {
 }
 
 #[test]
-fn layers_that_are_not_known_are_not_written() {
+fn missing_layers_are_not_written() {
     let path = folder("exr_bare").join("a.exr");
     write(&path, &Picture { variance: None, depth: None, ..picture(false) }, &DISPLAY, &small()).unwrap();
     let file = exr::prelude::read_all_flat_layers_from_file(&path).unwrap();
@@ -105,7 +105,7 @@ fn layers_that_are_not_known_are_not_written() {
 fn the_same_picture_is_the_same_bytes() {
     let folder = folder("same_bytes");
     for kind in KINDS {
-        // Eight, since a random order of four attributes repeats by chance.
+        // Eight files, since a random order of four attributes can repeat by chance.
         let files = (0..8).map(|index| {
             let path = folder.join(format!("{index}.{kind}"));
             write(&path, &picture(true), &DISPLAY, &small()).unwrap();
@@ -150,7 +150,7 @@ fn tiff_shows_the_tone_mapped_picture() {
 #[test]
 fn jpeg_shows_the_picture_over_black() {
     let path = folder("jpeg_pixels").join("a.jpg");
-    // One colour per 8 x 8 block, which the format keeps nearly exactly.
+    // One colour per 8 x 8 block, which JPEG keeps nearly exactly.
     let block = |x: usize| if x < 8 { [0.5, 0.1, 0.02, 0.5] } else { [0.02, 0.3, 0.4, 1.0] };
     let rgba: Vec<_> = (0..16 * 8).map(|i| block(i % 16)).collect();
     let picture = Picture { width: 16, height: 8, rgba, transparent: true, ..Picture::default() };
@@ -201,7 +201,7 @@ fn other_programs_comments_are_no_metadata() {
     assert_eq!(read_metadata(&folder.join("a.tif")).unwrap(), None);
 }
 
-/// The message, after making sure that nothing was left behind in the folder.
+/// The error message of a failed write; also asserts that nothing was left behind in the folder.
 fn refused(path: &Path) -> String {
     let list = |folder: &Path| fs::read_dir(folder).map(Iterator::count).unwrap_or(0);
     let folder = path.parent().expect("a path with a folder");
@@ -214,7 +214,7 @@ fn refused(path: &Path) -> String {
 }
 
 #[test]
-fn a_place_that_refuses_is_named_with_its_mend() {
+fn an_unwritable_path_is_named_with_a_fix() {
     let folder = folder("refused");
     assert!(refused(&folder.join("missing/a.png")).contains("create the folder"));
     assert!(refused(&folder.join("a.bmp")).contains(".png, .jpg, .jpeg, .tif, .tiff or .exr"));
@@ -223,9 +223,9 @@ fn a_place_that_refuses_is_named_with_its_mend() {
     fs::create_dir(folder.join("folder.png")).unwrap();
     assert!(refused(&folder.join("folder.png")).contains("add a file name"));
     fs::write(folder.join("file"), "").unwrap();
-    assert!(refused(&folder.join("file/a.exr")).contains("no folder"));
+    assert!(refused(&folder.join("file/a.exr")).contains("is not a folder"));
 
-    // Only the last step, the move into place, finds out.
+    // Only the last step, the move to the destination, fails.
     assert!(refused(&folder.join(format!("{}.png", "a".repeat(300)))).contains("shorter name"));
 
     let protected = folder.join("protected.png");
@@ -237,10 +237,10 @@ fn a_place_that_refuses_is_named_with_its_mend() {
     assert_eq!(fs::read(&protected).unwrap(), b"mine");
 }
 
-/// The kernel's own folders take files from nobody, whoever runs the test.
+/// Nobody can create files in the kernel's own folders, not even root.
 #[cfg(target_os = "linux")]
 #[test]
-fn an_unwritable_folder_is_named_with_its_mend() {
+fn an_unwritable_folder_is_named_with_a_fix() {
     let message = refused(Path::new("/sys/kernel/a.png"));
     assert!(message.contains("may write to"), "{message}");
 }
@@ -280,18 +280,18 @@ fn broken_pictures_are_errors_or_yield_what_they_hold() {
                     refusals += 1;
                     assert!(error.to_string().contains("cut."), "{error}");
                 }
-                // The metadata may lie wholly before the cut.
+                // The metadata may be complete before the cut.
                 Ok(read) => assert_eq!(entries(&read.unwrap()), entries(&small()), "{kind} cut at {length}"),
             }
         }
         assert!(refusals > 200, "{kind}: {refusals} refusals");
-        // Any answer is good but a panic.
+        // Any result but a panic is accepted.
         for_damaged_copies(&bytes, &path, |path| drop(read_metadata(path)));
     }
 }
 
 #[test]
-fn what_is_no_picture_is_said_to_be_none() {
+fn a_file_that_is_not_a_picture_is_reported() {
     let folder = folder("none");
     fs::write(folder.join("a.png"), "text").unwrap();
     assert!(matches!(read_metadata(&folder.join("a.png")), Err(ImageError::NotAPicture { .. })));

@@ -1,4 +1,4 @@
-//! Environment maps: what they mean, and what broken ones answer.
+//! Environment maps: what valid files mean, and which errors broken ones give.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,7 @@ use tyndall_formats::image::{ImageError, read_map};
 
 mod common;
 
-/// A 2 x 2 file whose channels hold the given values, in the order of rows.
+/// A 2 x 2 file whose channels hold the given values, row by row.
 fn write_exr(path: &Path, channels: &[(&str, [f32; 4])]) {
     write_exr_in(path, Encoding::SMALL_LOSSLESS, channels);
 }
@@ -44,7 +44,7 @@ fn exr_maps_keep_their_rows_and_their_first_layer() {
 }
 
 #[test]
-fn a_texel_that_is_no_radiance_is_named() {
+fn a_texel_that_is_not_a_radiance_is_named() {
     let path = folder("map_texel").join("a.exr");
     for (value, shown) in [(-1.0, "-1.0"), (f32::NAN, "NaN"), (f32::INFINITY, "inf")] {
         write_exr(&path, &[("R", [0.0; 4]), ("G", [0.0, 0.0, value, 0.0]), ("B", [0.0; 4])]);
@@ -72,9 +72,9 @@ fn radiance_pixels_share_an_exponent() {
 }
 
 #[test]
-fn radiance_runs_unfold() {
+fn radiance_runs_are_expanded() {
     let path = folder("map_runs").join("a.hdr");
-    // Red a run of 8; green 3 values and a run of 5; blue a run of 8 zeros; exponents value by value.
+    // Red: a run of 8; green: 3 values and a run of 5; blue: a run of 8 zeros; exponents: value by value.
     let by_channel = [
         &[2, 2, 0, 8, 136, 1][..],
         &[3, 7, 8, 9, 133, 4],
@@ -86,7 +86,7 @@ fn radiance_runs_unfold() {
     let greens = [7.0, 8.0, 9.0, 4.0, 4.0, 4.0, 4.0, 4.0];
     assert_eq!(read_map(&path).unwrap().pixels, greens.map(|g| Rgb::new(1.0, g, 0.0)));
 
-    // The older coding: one pixel, 2 more of it, and 1 x 256 more; then another pixel.
+    // The older coding: one pixel, repeated 2 times and then 1 x 256 times; then another pixel.
     let old = [5, 0, 0, 136, 1, 1, 1, 2, 1, 1, 1, 1, 9, 9, 9, 136];
     write_hdr(&path, &format!("{HEADER}-Y 1 +X 260\n"), &old);
     let pixels = read_map(&path).unwrap().pixels;
@@ -95,7 +95,7 @@ fn radiance_runs_unfold() {
 }
 
 #[test]
-fn broken_radiance_files_say_where() {
+fn errors_of_broken_radiance_files_say_where() {
     let path = folder("map_broken").join("a.hdr");
     let long = HEADER.replace("\n\n", &format!("\n{}\n\n", "x".repeat(2 << 20)));
     for (header, pixels, part) in [
@@ -149,7 +149,7 @@ fn broken_exr_maps_are_errors() {
     for_damaged_copies(&bytes, &path, |path| drop(read_map(path)));
 }
 
-/// Nothing of the promised size may be taken for these few bytes, be it few large blocks or many small ones.
+/// No memory of the stated size may be allocated for these few bytes, whether in a few large blocks or many small ones.
 #[test]
 fn an_exr_header_cannot_promise_more_than_the_file_holds() {
     let path = folder("map_huge").join("a.exr");
@@ -162,7 +162,7 @@ fn an_exr_header_cannot_promise_more_than_the_file_holds() {
             let mut bytes = bytes.clone();
             for window in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
                 let name = bytes.windows(window.len()).position(|found| found == window.as_bytes()).unwrap();
-                // After the size: x and y of the first corner, x and y of the last.
+                // After the attribute's size: x and y of the first corner, x and y of the last.
                 let last_x = name + window.len() + 4 + 8;
                 bytes[last_x..last_x + 4].copy_from_slice(&(width - 1).to_le_bytes());
             }
@@ -186,7 +186,7 @@ fn other_kinds_and_places_are_refused() {
     assert!(matches!(read_map(&folder.join("b.exr")), Err(ImageError::Unreadable { .. })));
 }
 
-/// A file of 60 KiB whose header asks for tiles of 64 x 16777280 took 2 GiB.
+/// A file of 60 KiB whose header states tiles of 64 x 16777280 once took 2 GiB.
 #[test]
 fn tiles_larger_than_the_picture_are_refused() {
     let path = folder("map_tiles").join("a.exr");

@@ -1,16 +1,16 @@
-//! Every file that the formats' reference libraries write is read as those libraries read it.
+//! Every file written by a format's reference library is read as that library reads it.
 //!
-//! `tests/oracle/make_and_dump.py FOLDER [DATA]` writes the files and what nibabel, pynrrd, SimpleITK and
-//! NumPy make of them; `TYNDALL_ORACLE_DIR` then names that folder, and `TYNDALL_DATA_DIR` the folder of real
+//! `tests/oracle/make_and_dump.py FOLDER [DATA]` writes the files, and what nibabel, pynrrd, SimpleITK and
+//! NumPy read from them. Set `TYNDALL_ORACLE_DIR` to that folder, and `TYNDALL_DATA_DIR` to the folder of real
 //! files, if they were dumped too.
 
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use tyndall_formats::volume::read;
 
-/// Relative difference that single-precision headers leave in places and directions.
+/// Relative difference in positions and directions due to single-precision headers.
 const PLACE_TOLERANCE: f64 = 1e-5;
-/// A value after slope and intercept may round differently by one unit of single precision.
+/// After slope and intercept, a value may round differently by one unit of single precision.
 const VALUE_TOLERANCE: f64 = f32::EPSILON as f64;
 
 #[derive(Deserialize)]

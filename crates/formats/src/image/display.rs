@@ -5,14 +5,14 @@ use tyndall::math::Rgb;
 
 use super::{Display, Picture};
 
-/// Opaque RGB, three bytes a pixel; premultiplied colours of a transparent picture are their own view over black.
+/// Opaque RGB, three bytes a pixel; premultiplied colours of a transparent picture already are the picture over black.
 pub(super) fn rgb8(picture: &Picture, display: &Display) -> Vec<u8> {
     picture.rgba.iter().flat_map(|&[r, g, b, _]| shown(Rgb::new(r, g, b), display)).collect()
 }
 
-/// Straight RGBA, four bytes a pixel: colours are divided by the opacity before the curve, the opacity stays linear.
+/// Straight RGBA, four bytes a pixel: colours are divided by opacity before the tone curve; opacity stays linear.
 ///
-/// Where the opacity is 0 the pixel is transparent black: straight opacity cannot hold light without matter.
+/// Where the opacity is 0 the pixel is transparent black: straight alpha cannot represent light at zero opacity.
 pub(super) fn straight_rgba8(picture: &Picture, display: &Display) -> Vec<u8> {
     let pixel = |&[r, g, b, alpha]: &[f32; 4]| {
         let opacity = quantize(alpha);

@@ -1,4 +1,4 @@
-//! What can go wrong with a picture, each with its mend.
+//! What can go wrong with a picture, each with its fix.
 
 use std::io::{Error, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -8,17 +8,17 @@ use tyndall::message::{excerpt, path_name, sentence};
 /// A picture or map that could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
-    /// The file's name does not tell a known kind.
+    /// The file's extension is missing or unknown.
     #[error("{}: {found}; give it one of {known}", path_name(path))]
     Extension {
         /// The file.
         path: PathBuf,
-        /// What stands at the end of its name.
+        /// The extension found, in words.
         found: String,
         /// The extensions that are known.
         known: &'static str,
     },
-    /// The disk does not take the file.
+    /// The file cannot be written.
     #[error("{}: cannot write the picture: {source}; {mend}", path_name(path))]
     Unwritable {
         /// The file.
@@ -28,7 +28,7 @@ pub enum ImageError {
         /// What to do.
         mend: String,
     },
-    /// The disk does not give the file.
+    /// The file cannot be read.
     #[error("{}: cannot read the picture: {source}; {mend}", path_name(path))]
     Unreadable {
         /// The file.
@@ -47,12 +47,12 @@ pub enum ImageError {
         width: u64,
         /// Rows.
         height: u64,
-        /// The most that fits.
+        /// The limit, in words.
         limit: String,
         /// What to do.
         mend: &'static str,
     },
-    /// The file's library refused the picture.
+    /// The encoding library refused the picture.
     #[error("{}: cannot encode the picture: {}; try another kind of file", path_name(path), sentence(reason))]
     Encode {
         /// The file.
@@ -60,12 +60,12 @@ pub enum ImageError {
         /// The library's reason.
         reason: String,
     },
-    /// The file's content is damaged, or of a variant that is not read.
+    /// The file's content is damaged, or of an unsupported variant.
     #[error("{}: not a readable {kind} file: {}; copy or save it again", path_name(path), sentence(reason))]
     Malformed {
         /// The file.
         path: PathBuf,
-        /// The kind that its first bytes or its name promise.
+        /// The kind, judged by its first bytes or its name.
         kind: &'static str,
         /// What was found and what was expected.
         reason: String,
@@ -79,7 +79,7 @@ pub enum ImageError {
         /// The file.
         path: PathBuf,
     },
-    /// A texel of a map is not a radiance.
+    /// A texel of a map is not a valid radiance.
     #[error(
         "{}: texel ({x}, {y}) is {value:?}, expected values from 0 to {BRIGHTEST:e}; repair it in the map",
         path_name(path)
@@ -109,7 +109,9 @@ impl ImageError {
         let folder = crate::atomic::folder_of(path);
         let mend = match source.kind() {
             ErrorKind::NotFound => format!("create the folder {} first", path_name(folder)),
-            ErrorKind::NotADirectory => format!("choose another place: {} is no folder", path_name(folder)),
+            ErrorKind::NotADirectory => {
+                format!("choose another place: {} is not a folder", path_name(folder))
+            }
             ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
                 "choose a file and folder that you may write to".to_owned()
             }
@@ -125,7 +127,7 @@ impl ImageError {
 
     pub(super) fn unreadable(path: &Path, source: Error) -> Self {
         let mend = match source.kind() {
-            ErrorKind::PermissionDenied => "ask for the right to read it",
+            ErrorKind::PermissionDenied => "ask for permission to read it",
             ErrorKind::IsADirectory => "name a file inside it",
             _ => "check the path",
         };
@@ -137,7 +139,7 @@ impl ImageError {
     }
 }
 
-/// Why an encoder gave up, before the file is known.
+/// Why an encoder failed; the path is added later.
 #[derive(Debug)]
 pub(super) enum EncodeFailure {
     TooLarge { width: u32, height: u32, limit: String },

@@ -1,6 +1,6 @@
-//! OpenEXR: the linear record, 32-bit float without loss.
+//! OpenEXR: linear radiance in 32-bit float, compressed without loss.
 //!
-//! One part whose channels are named by layer, as other programs show them: `R G B A` premultiplied,
+//! One part whose channels are named by layer, as other programs expect: `R G B A` premultiplied,
 //! `variance.R variance.G variance.B` of the pixel's mean, `depth.Z`. Metadata are string attributes in UTF-8.
 
 use std::io::{BufRead, Cursor, Seek};
@@ -57,7 +57,7 @@ fn channel(name: &str, samples: impl Iterator<Item = f32>) -> AnyChannel<FlatSam
 
 /// Puts the header's attributes in the order of their names.
 ///
-/// The library keeps our own in a randomly seeded table; the same picture shall be the same bytes.
+/// The library keeps custom ones in a randomly seeded hash table; the same picture must give the same bytes.
 fn sort_attributes(file: &mut [u8]) {
     let start = 8; // after magic number and version
     let mut end = start;
@@ -91,8 +91,8 @@ pub(super) fn read_metadata(file: impl BufRead) -> Result<Metadata, String> {
     Ok(metadata)
 }
 
-/// The largest factor by which the format's codecs shrink: deflate, the best, reaches 1032; the lossy DCT of
-/// DWA leaves 1 of 64 coefficients of a flat field to it.
+/// The largest compression ratio of the format's codecs. Deflate, the best, reaches 1032; the lossy DCT of DWA
+/// leaves it 1 of 64 coefficients of a flat field.
 const SHRINKS_LOSSLESS: u64 = 1100;
 const SHRINKS_DCT: u64 = 64 * SHRINKS_LOSSLESS;
 
@@ -107,7 +107,7 @@ pub(super) fn read_map(mut file: impl BufRead + Seek, length: u64) -> Result<Map
         let names = names.take(20).collect::<Vec<_>>().join(", ");
         return Err(MapFailure::Malformed(format!("found channels {names}, expected R, G and B")));
     };
-    // All, because the library chooses the layer for itself.
+    // All are checked, because the library chooses the layer by its own rule.
     headers.iter().try_for_each(|header| check_size(header, length))?;
     if header.shared_attributes.display_window != header.data_window() {
         let reason =
@@ -148,7 +148,7 @@ fn rgb_names(channels: &ChannelList) -> Option<[Text; 3]> {
     })
 }
 
-/// Pixels of a tile that are taken for granted.
+/// Tiles of up to this many pixels are accepted even if they exceed the picture.
 const LARGEST_TILE: u64 = 1 << 20;
 
 fn check_size(header: &Header, length: u64) -> Result<(), MapFailure> {
@@ -159,7 +159,7 @@ fn check_size(header: &Header, length: u64) -> Result<(), MapFailure> {
         _ => SHRINKS_LOSSLESS,
     };
     let bytes = (width * height).saturating_mul(header.channels.bytes_per_pixel as u64);
-    // Memory is taken for whole tiles, even where the picture is smaller.
+    // The library allocates whole tiles, even where the picture is smaller.
     if let BlockDescription::Tiles(tiles) = header.blocks {
         let [across, down] = [tiles.tile_size.width() as u64, tiles.tile_size.height() as u64];
         if across.saturating_mul(down) > LARGEST_TILE.max(width * height) {
@@ -170,7 +170,7 @@ fn check_size(header: &Header, length: u64) -> Result<(), MapFailure> {
     if bytes / shrinks > length {
         let found = format!("{length} bytes for {width} x {height} pixels");
         return Err(MapFailure::Malformed(format!(
-            "found {found}, expected more: the file is cut off or its header wrong"
+            "found {found}, expected more: the file is cut off or its header is wrong"
         )));
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! JPEG: 8 bits, sRGB, opaque; metadata as JSON in comment segments.
 //!
-//! A segment holds at most 65533 bytes, so the JSON, in ASCII, is cut into parts. Part k of n is one COM
-//! segment: the line `tyndall k/n`, then its share of the text. Parts stand in order after the JFIF header.
+//! A segment holds at most 65533 bytes, so the JSON, in ASCII, is split into parts. Part k of n is one COM
+//! segment: the line `tyndall k/n`, then its part of the text. The parts follow the JFIF header in order.
 
 use std::io::{BufRead, Read};
 
@@ -10,7 +10,7 @@ use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 use super::error::EncodeFailure;
 use super::{Display, Metadata, Picture, display};
 
-/// Of 100: finer than the eye sees.
+/// Out of 100; the loss is not visible.
 const QUALITY: u8 = 95;
 /// Bytes of text in one segment; the rest of the 65533 is for the framing line.
 const SHARE: usize = 65_000;
@@ -49,7 +49,7 @@ fn comments(metadata: &Metadata) -> Vec<u8> {
     let mut segments = Vec::new();
     for (index, share) in shares.enumerate() {
         let framing = format!("tyndall {}/{count}\n", index + 1);
-        // The length counts its own two bytes.
+        // The length includes its own two bytes.
         let length =
             u16::try_from(2 + framing.len() + share.len()).expect("a share leaves room for its framing");
         segments.extend([0xFF, COMMENT]);
@@ -60,7 +60,7 @@ fn comments(metadata: &Metadata) -> Vec<u8> {
     segments
 }
 
-/// JFIF wants its own segment, the encoder's first, right after the start of the image.
+/// JFIF requires its own segment, which the encoder writes first, right after the start of the image.
 fn insert_after_header(mut coded: Vec<u8>, segments: &[u8]) -> Vec<u8> {
     let header = usize::from(u16::from_be_bytes([coded[4], coded[5]]));
     let place = 4 + header;

@@ -11,9 +11,9 @@ use super::{exr, lower_extension, open, radiance};
 /// Reads an environment map: OpenEXR (.exr, the first layer with R, G and B) or Radiance (.hdr).
 ///
 /// # Errors
-/// [`ImageError::Extension`] for another kind, [`ImageError::Unreadable`] if the disk refuses,
+/// [`ImageError::Extension`] for another kind, [`ImageError::Unreadable`] if the file cannot be read,
 /// [`ImageError::Malformed`] for a damaged file, [`ImageError::TooLarge`] beyond 2^28 texels,
-/// [`ImageError::Texel`] for one that is negative, undefined or beyond [`BRIGHTEST`].
+/// [`ImageError::Texel`] for one that is negative, NaN or above [`BRIGHTEST`].
 pub fn read_map(path: &Path) -> Result<Map, ImageError> {
     let extension = lower_extension(path);
     let kind = match extension.as_str() {

@@ -1,4 +1,4 @@
-//! What a picture tells about its making: a list of texts by key.
+//! How a picture was made, stored in its file: a list of texts by key.
 
 use serde_json::{Map, Value};
 
@@ -18,10 +18,10 @@ impl Metadata {
     /// Key of the samples per pixel.
     pub const SAMPLES: &str = "tyndall:samples";
 
-    /// Sets the text of a key: in its place where the key is known, else at the end.
+    /// Sets the text of a key: replaces an existing entry, otherwise appends one.
     ///
     /// # Panics
-    /// Unless the key is `tyndall:` and up to 23 printable ASCII characters more, which every kind of file can hold.
+    /// Unless the key is `tyndall:` followed by 1 to 23 printable ASCII characters, which every kind of file can hold.
     pub fn insert(&mut self, key: &str, text: impl Into<String>) {
         assert!(is_own(key), "metadata key `{key}`");
         match self.entries.iter_mut().find(|(known, _)| known == key) {
@@ -47,14 +47,14 @@ impl Metadata {
         self.entries.is_empty()
     }
 
-    /// Keeps an entry of a file if it is one of ours.
+    /// Adds an entry read from a file if its key is one of ours.
     pub(super) fn accept(&mut self, key: &str, text: impl Into<String>) {
         if is_own(key) {
             self.insert(key, text);
         }
     }
 
-    /// One JSON object in pure ASCII, which no reader of a TIFF or JPEG comment can take for another encoding.
+    /// One JSON object in pure ASCII, which no reader of a TIFF or JPEG comment can mistake for another encoding.
     pub(super) fn to_ascii_json(&self) -> String {
         let object: Map<String, Value> =
             self.iter().map(|(key, text)| (key.to_owned(), text.into())).collect();
@@ -84,7 +84,7 @@ impl Metadata {
     }
 }
 
-/// OpenEXR holds names of up to 31 bytes without a format flag that old readers refuse; PNG holds 79.
+/// Whether the key is ours. OpenEXR allows names of up to 31 bytes without a flag that old readers refuse; PNG, 79.
 pub(super) fn is_own(key: &str) -> bool {
     key.len() <= 31
         && key

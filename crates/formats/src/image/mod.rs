@@ -1,8 +1,8 @@
-//! Pictures: written as PNG, JPEG, TIFF and OpenEXR, and environment maps read from OpenEXR and Radiance.
+//! Pictures, written as PNG, JPEG, TIFF and OpenEXR; environment maps, read from OpenEXR and Radiance.
 //!
-//! The 8-bit kinds show the picture through a tone curve. OpenEXR is the record: linear float,
+//! The 8-bit kinds hold the picture after a tone curve. OpenEXR keeps the full data: linear float,
 //! premultiplied, with the variance of each pixel's mean and the depth as further layers.
-//! Every written picture carries its [`Metadata`], so that it can be made again.
+//! Every written picture carries its [`Metadata`], so that it can be rendered again.
 //!
 //! ```
 //! use tyndall_formats::image::{Display, Metadata, Picture, read_metadata, write};
@@ -40,7 +40,7 @@ pub use map::read_map;
 pub use metadata::Metadata;
 pub use texels::Map;
 
-/// The kinds of picture, for messages.
+/// Extensions of the kinds that are written, for messages.
 const EXTENSIONS: &str = ".png, .jpg, .jpeg, .tif, .tiff or .exr";
 
 /// A finished picture: rows from the top, each from the left.
@@ -50,7 +50,7 @@ pub struct Picture {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Linear radiance in Rec. 709 primaries, premultiplied, and the opacity in [0, 1].
+    /// Linear radiance in Rec. 709 primaries, premultiplied by opacity, and the opacity in [0, 1].
     pub rgba: Vec<[f32; 4]>,
     /// Variance of each pixel's mean, where it is known.
     pub variance: Option<Vec<[f32; 3]>>,
@@ -70,23 +70,23 @@ impl Picture {
     }
 }
 
-/// How the 8-bit kinds show a picture; OpenEXR ignores it.
+/// How the 8-bit kinds display a picture; OpenEXR ignores it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Display {
     /// From radiance to code values.
     pub tone: ToneCurve,
-    /// Brightens by 2^exposure before the curve.
+    /// Multiplies by 2^exposure before the curve.
     pub exposure: f32,
 }
 
-/// Writes a picture in the kind that the path's extension names, whatever its case.
+/// Writes a picture in the kind given by the path's extension, in any case.
 ///
-/// The file appears whole or not at all: it is written beside its place and then moved there.
-/// JPEG has no opacity and shows a transparent picture over black.
+/// The file appears whole or not at all: it is written beside its destination and then moved there.
+/// JPEG has no opacity, so a transparent picture is written over black.
 ///
 /// # Errors
 /// [`ImageError::Extension`] for an unknown kind, [`ImageError::TooLarge`] where the kind has a limit,
-/// [`ImageError::Unwritable`] if the disk refuses.
+/// [`ImageError::Unwritable`] if the file cannot be written.
 ///
 /// # Panics
 /// If the picture is empty or its layers differ in size.
@@ -108,8 +108,8 @@ pub fn write(
     atomic::replace(path, &bytes).map_err(|source| ImageError::unwritable(path, source))
 }
 
-/// Tells before a long render whether [`write()`] could put a picture there: the kind is known, the folder
-/// is there and takes files, and nothing but a file stands in the place.
+/// Checks before a long render whether [`write()`] could write a picture there: the kind is known, the folder
+/// exists and is writable, and the path is free, or names a writable file, a device or a pipe.
 ///
 /// # Errors
 /// As [`write()`].
@@ -120,7 +120,7 @@ pub fn check_destination(path: &Path) -> Result<(), ImageError> {
     atomic::check(path).map_err(|source| ImageError::unwritable(path, source))
 }
 
-/// The bytes of a PNG file, for a pipe.
+/// The bytes of a PNG file, to be written to a pipe.
 ///
 /// # Errors
 /// [`ImageError::TooLarge`] beyond what the kind can hold.
@@ -132,12 +132,12 @@ pub fn encode_png(picture: &Picture, display: &Display, metadata: &Metadata) -> 
     png::encode(picture, display, metadata).map_err(|failure| failure.at(Path::new("standard output")))
 }
 
-/// What Tyndall noted in a picture of any of the four kinds, told apart by content; `None` if it noted nothing.
+/// The metadata in a picture of any of the four kinds, recognised by content; `None` if it has none of ours.
 ///
 /// Pixels are not read, so that a picture with damaged pixels still yields its scene.
 ///
 /// # Errors
-/// [`ImageError::Unreadable`] if the disk refuses, [`ImageError::NotAPicture`] for another kind of file,
+/// [`ImageError::Unreadable`] if the file cannot be read, [`ImageError::NotAPicture`] for another kind of file,
 /// [`ImageError::Malformed`] for a damaged one.
 pub fn read_metadata(path: &Path) -> Result<Option<Metadata>, ImageError> {
     let (mut file, length) = open(path)?;
@@ -153,7 +153,7 @@ pub fn read_metadata(path: &Path) -> Result<Option<Metadata>, ImageError> {
     Ok(Some(metadata).filter(|metadata| !metadata.is_empty()))
 }
 
-/// Opens a regular file; a pipe or device could keep its reader waiting for ever.
+/// Opens a regular file; reading a pipe or device could block for ever.
 fn open(path: &Path) -> Result<(BufReader<File>, u64), ImageError> {
     let unreadable = |source| ImageError::unreadable(path, source);
     let about = std::fs::metadata(path).map_err(unreadable)?;
@@ -185,7 +185,7 @@ impl Kind {
         }
     }
 
-    /// By the first bytes; leaves the reader at the start.
+    /// The kind by the first bytes; leaves the reader at the start.
     fn of_content(file: &mut (impl Read + Seek)) -> std::io::Result<Option<Self>> {
         let mut start = Vec::new();
         file.by_ref().take(4).read_to_end(&mut start)?;

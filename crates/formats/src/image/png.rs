@@ -1,4 +1,4 @@
-//! PNG: 8 bits, sRGB; opacity straight where the picture is transparent; metadata as compressed UTF-8 texts (iTXt).
+//! PNG: 8 bits, sRGB; straight alpha if the picture is transparent; metadata as compressed UTF-8 texts (iTXt).
 
 use std::io::{BufRead, Seek};
 
@@ -9,7 +9,7 @@ use super::error::EncodeFailure;
 use super::metadata::{Metadata, is_own};
 use super::{Display, Picture, display};
 
-/// Most bytes of text that are unpacked from one picture.
+/// Most bytes of text that are decompressed from one picture.
 const TEXT_LIMIT: usize = 64 << 20;
 
 pub(super) fn encode(

@@ -6,11 +6,11 @@ use tyndall::math::{Rgb, cast};
 
 use super::texels::{Map, MapFailure};
 
-/// Longest header that is read.
+/// Longest header that is read, in bytes.
 const HEADER_LIMIT: u64 = 1 << 20;
-/// Most pixels that a byte of the file stands for: a run of 255 in 4 bytes.
+/// Most pixels that one byte of the file can encode: a run of 255 takes 4 bytes.
 const PIXELS_PER_BYTE: u64 = 64;
-/// Widths that the newer run-length coding, by channel, can tell \[Ward91\].
+/// Widths that the newer run-length coding, by channel, can encode \[Ward91\].
 const BY_CHANNEL: std::ops::RangeInclusive<usize> = 8..=0x7FFF;
 
 type Rgbe = [u8; 4];
@@ -45,7 +45,7 @@ struct Header {
     height: usize,
     bottom_up: bool,
     right_to_left: bool,
-    /// What the file's values were multiplied with, by channel.
+    /// Factor by which the file's values were multiplied, by channel.
     gain: [f64; 3],
 }
 
@@ -82,7 +82,7 @@ impl Header {
         Ok(Self { width, height, bottom_up: y == "+Y", right_to_left: x == "-X", gain })
     }
 
-    /// The mantissas are taken as they are, so that a zero is black, as today's programs do.
+    /// Mantissas are used without adding 0.5, so that a zero is black, as in today's programs.
     fn radiance(&self, [r, g, b, exponent]: Rgbe) -> Rgb {
         if exponent == 0 {
             return Rgb::BLACK;
@@ -129,7 +129,7 @@ fn read_line(file: &mut impl BufRead, line: &mut [Rgbe]) -> Result<(), String> {
     (0..4).try_for_each(|channel| read_channel(file, channel, line))
 }
 
-/// One channel: a count above 128 repeats the next byte count - 128 times, else so many bytes follow.
+/// One channel: a count above 128 repeats the next byte count - 128 times; otherwise, count bytes follow.
 fn read_channel(file: &mut impl BufRead, channel: usize, line: &mut [Rgbe]) -> Result<(), String> {
     let mut rest = line;
     while !rest.is_empty() {
@@ -152,7 +152,7 @@ fn read_channel(file: &mut impl BufRead, channel: usize, line: &mut [Rgbe]) -> R
     Ok(())
 }
 
-/// Whole pixels; (1, 1, 1, n) repeats the last one n times, and each further one in a row counts 256-fold.
+/// Whole pixels; (1, 1, 1, n) repeats the last pixel n times, and each further such code in a row counts 256-fold.
 fn read_pixels(file: &mut impl BufRead, first: Rgbe, line: &mut [Rgbe]) -> Result<(), String> {
     let mut filled = 0;
     let mut unit = 1_usize;

@@ -1,4 +1,4 @@
-//! The texels of an environment map, and why there are none.
+//! The texels of an environment map, and why they could not be read.
 
 use tyndall::math::Rgb;
 
@@ -17,7 +17,7 @@ pub struct Map {
 pub(super) const MOST_TEXELS: u64 = 1 << 28;
 
 impl Map {
-    /// Refuses a size that no map has, before memory is taken for it.
+    /// Refuses a size of zero or above the limit, before memory is allocated for it.
     pub(super) fn check_size(width: u64, height: u64) -> Result<(), MapFailure> {
         if width == 0 || height == 0 {
             return Err(MapFailure::Malformed(format!(
@@ -31,7 +31,7 @@ impl Map {
     }
 }
 
-/// Why a map's reader gave up, before the file is known.
+/// Why a map could not be read; the path is added later.
 #[derive(Debug)]
 pub(super) enum MapFailure {
     TooLarge { width: u64, height: u64 },

@@ -1,4 +1,4 @@
-//! TIFF: 8 bits, sRGB, deflated; opacity straight where the picture is transparent; metadata as JSON in ImageDescription.
+//! TIFF: 8 bits, sRGB, deflated; straight alpha if the picture is transparent; metadata as JSON in ImageDescription.
 
 use std::io::{BufRead, Cursor, ErrorKind, Read, Seek, SeekFrom};
 
@@ -10,7 +10,7 @@ use tiff::tags::{ExtraSamples, Tag, Type};
 use super::error::EncodeFailure;
 use super::{Display, Metadata, Picture, display};
 
-/// Most bytes of text that are read from one picture, however long the file is.
+/// Most bytes of text that are read from one picture, whatever the file's length.
 const TEXT_LIMIT: u64 = 64 << 20;
 
 pub(super) fn encode(
@@ -40,8 +40,8 @@ fn try_encode(picture: &Picture, display: &Display, metadata: &Metadata) -> Resu
 
 /// The text of the first directory's ImageDescription.
 ///
-/// Of a damaged file the library would print to standard error and take memory that the file does not hold, so the
-/// few fields on the way are read here. Tyndall writes no BigTIFF.
+/// Given a damaged file, the library prints to standard error and allocates more memory than the file holds, so the
+/// few fields needed are read here. Tyndall does not write BigTIFF.
 pub(super) fn read_metadata(mut file: impl BufRead + Seek, length: u64) -> Result<Metadata, String> {
     let mut order = [0; 4];
     file.read_exact(&mut order).map_err(ends)?;
@@ -54,7 +54,7 @@ pub(super) fn read_metadata(mut file: impl BufRead + Seek, length: u64) -> Resul
     for _ in 0..fields.u16()? {
         let [tag, kind] = [fields.u16()?, fields.u16()?];
         let [count, place] = [fields.u32()?, fields.u32()?];
-        // Four bytes or fewer would stand in the place of `place`, and are none of ours.
+        // A text of four bytes or fewer would be stored in `place` itself, and cannot be ours.
         if tag != Tag::ImageDescription.to_u16() || kind != Type::ASCII.to_u16() || count <= 4 {
             continue;
         }
@@ -73,7 +73,7 @@ pub(super) fn read_metadata(mut file: impl BufRead + Seek, length: u64) -> Resul
     Ok(Metadata::default())
 }
 
-/// Numbers one after the other, in the file's byte order.
+/// Reads consecutive numbers in the file's byte order.
 struct Fields<F> {
     file: F,
     little: bool,
@@ -93,7 +93,7 @@ impl<F: Read> Fields<F> {
     }
 }
 
-#[expect(clippy::needless_pass_by_value, reason = "as `map_err` hands it over")]
+#[expect(clippy::needless_pass_by_value, reason = "the signature that `map_err` needs")]
 fn ends(error: std::io::Error) -> String {
     match error.kind() {
         ErrorKind::UnexpectedEof => "the file ends inside its directory".to_owned(),

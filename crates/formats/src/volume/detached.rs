@@ -1,4 +1,4 @@
-//! Samples in files beside their header: one, or several that hold slabs of the slowest axis.
+//! Samples in files apart from their header: one file, or several, each holding a slab of the slowest axis.
 
 use super::error::ReadError;
 use super::fields::numbered_files;
@@ -8,7 +8,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use tyndall::volume::Voxels;
 
-/// The files that the value of `key` names: a list that stands below it, a numbered pattern, or one file.
+/// The files that the value of `key` names: the list below it, a numbered pattern, or one file.
 pub(super) fn names(
     header: &Path,
     key: &str,
@@ -19,7 +19,7 @@ pub(super) fn names(
     let words: Vec<&str> = value.split_whitespace().collect();
     let names = match words[..] {
         ["LIST"] | ["LIST", _] => listed,
-        // A fourth number tells the axes of a slab, which follow from the number of files.
+        // A fourth number states the axes of a slab; it is not needed, as the number of files implies them.
         [pattern, ref range @ ..] if pattern.contains('%') && (2..=4).contains(&range.len()) => {
             let mut numbers = [0, 0, 1];
             for (number, word) in numbers.iter_mut().zip(range) {
@@ -38,8 +38,8 @@ pub(super) fn names(
     Ok(names)
 }
 
-/// Reads the named files, whose places are relative to the header's; `open` comes from a file to so many
-/// bytes of samples.
+/// Reads the named files, whose paths are relative to the header's folder; `open(path, n)` opens one from which
+/// `n` bytes of samples are needed.
 pub(super) fn read(
     header: &Path,
     names: &[String],

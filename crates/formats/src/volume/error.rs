@@ -10,10 +10,10 @@ pub(super) const KINDS: &str =
     "NRRD (.nrrd, .nhdr), NIfTI (.nii, .nii.gz, .hdr + .img), MetaImage (.mha, .mhd) and NumPy (.npy)";
 
 /// Why a volume file could not be read. Each message names the file, what was found, what was
-/// expected and, where it helps, the mend.
+/// expected and, where it helps, the fix.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The operating system refused.
+    /// The operating system reported an error.
     #[error("{}: cannot be read: {source}", path_name(.path))]
     Io {
         /// The file.
@@ -24,53 +24,53 @@ pub enum ReadError {
     /// A folder, a pipe or a device.
     #[error("{}: {found}, expected a regular file", path_name(.path))]
     NotAFile {
-        /// What was asked for.
+        /// The path given.
         path: PathBuf,
-        /// What stands there instead.
+        /// What is there instead.
         found: &'static str,
     },
-    /// No byte in it.
+    /// The file has no bytes.
     #[error("{}: the file is empty, expected a volume", path_name(.path))]
     Empty {
         /// The file.
         path: PathBuf,
     },
-    /// Neither the first bytes nor the extension tell a kind.
-    #[error("{}: no kind of volume that is known here; known are {KINDS}; for raw samples state their layout", path_name(.path))]
+    /// Neither the first bytes nor the extension identify the kind.
+    #[error("{}: not a known kind of volume; known are {KINDS}; for raw samples state their layout", path_name(.path))]
     UnknownKind {
         /// The file.
         path: PathBuf,
     },
-    /// A header says something that cannot be.
+    /// A header has a missing or invalid entry.
     #[error("{}: {key}: found {found}, expected {expected}", path_name(.path))]
     Header {
         /// The file.
         path: PathBuf,
         /// The header's key, or the place in it.
         key: String,
-        /// What stands there.
+        /// What is there.
         found: String,
-        /// What may stand there.
+        /// What is allowed there.
         expected: String,
     },
-    /// A valid file of a sort that is not read here.
+    /// A valid file of a variant that is not supported.
     #[error("{}: {} is not supported; {mend}", path_name(.path), sentence(.what))]
     Unsupported {
         /// The file.
         path: PathBuf,
         /// The feature.
         what: String,
-        /// How to get round it.
+        /// How to get around it.
         mend: String,
     },
-    /// Fewer samples than the header asks for.
-    #[error("{}: {found} bytes of samples, expected {expected} by the header; the file is cut short or its header is wrong", path_name(.path))]
+    /// Fewer samples than the header states.
+    #[error("{}: {found} bytes of samples, expected {expected} according to the header; the file is cut short or its header is wrong", path_name(.path))]
     Short {
         /// The file that holds the samples.
         path: PathBuf,
-        /// Bytes after decompression (of text: samples).
+        /// Bytes after decompression (for text: samples).
         found: u64,
-        /// Bytes that the header asks for (of text: samples).
+        /// Bytes that the header states (for text: samples).
         expected: u64,
     },
     /// The compressed stream or the text of the samples is damaged.
@@ -81,12 +81,12 @@ pub enum ReadError {
         /// What the decoder said.
         message: String,
     },
-    /// The samples would not fit.
+    /// The samples would not fit in memory.
     #[error("{}: needs {needed} bytes of memory, but {available} are available; crop or downsample it", path_name(.path))]
     Memory {
         /// The file.
         path: PathBuf,
-        /// Bytes that the samples take.
+        /// Bytes that the samples need.
         needed: u64,
         /// Bytes that the machine has left.
         available: u64,
@@ -96,18 +96,18 @@ pub enum ReadError {
     DataFile {
         /// The header's file.
         path: PathBuf,
-        /// What is wrong with the other.
+        /// What is wrong with the data file.
         source: Box<ReadError>,
     },
     /// The data values are too large to be rendered.
-    #[error("{}: values from {:e} to {:e}, expected at most {:e} in size; rescale them", path_name(.path), .range[0], .range[1], f32::MAX)]
+    #[error("{}: values from {:e} to {:e}, expected at most {:e} in magnitude; rescale them", path_name(.path), .range[0], .range[1], f32::MAX)]
     Values {
         /// The file.
         path: PathBuf,
         /// The smallest and the largest data value.
         range: [f64; 2],
     },
-    /// The header's geometry cannot be.
+    /// The header's geometry is invalid.
     #[error("{}: {source}", path_name(.path))]
     Grid {
         /// The file.
@@ -115,7 +115,7 @@ pub enum ReadError {
         /// Why.
         source: GridError,
     },
-    /// Samples and grid make no volume.
+    /// The samples and the grid do not make a valid volume.
     #[error("{}: {source}", path_name(.path))]
     Volume {
         /// The file.
@@ -126,7 +126,7 @@ pub enum ReadError {
 }
 
 impl ReadError {
-    /// A header's entry that cannot be; quotes what was found.
+    /// An invalid header entry; quotes what was found.
     pub(super) fn header(path: &Path, key: &str, found: &str, expected: &str) -> Self {
         Self::Header {
             path: path.into(),
@@ -136,7 +136,7 @@ impl ReadError {
         }
     }
 
-    /// A header's entry that is not there.
+    /// A missing header entry.
     pub(super) fn missing(path: &Path, key: &str, expected: &str) -> Self {
         Self::Header {
             path: path.into(),
@@ -146,17 +146,17 @@ impl ReadError {
         }
     }
 
-    /// Something valid that is not read here.
+    /// Something valid that is not supported.
     pub(super) fn unsupported(path: &Path, what: impl Into<String>, mend: impl Into<String>) -> Self {
         Self::Unsupported { path: path.into(), what: what.into(), mend: mend.into() }
     }
 
-    /// A trouble of the operating system; one that carries a [`ReadError`] gives it back.
+    /// An I/O error; if it wraps a [`ReadError`], that one is returned.
     pub(super) fn io(path: &Path, error: io::Error) -> Self {
         error.downcast::<Self>().unwrap_or_else(|source| Self::Io { path: path.into(), source })
     }
 
-    /// The same trouble, in the data file that `header` names.
+    /// The same error, in the data file that `header` names.
     pub(super) fn in_data_file(self, header: &Path) -> Self {
         Self::DataFile { path: header.into(), source: Box::new(self) }
     }

@@ -1,11 +1,11 @@
-//! Text headers of keys and values, as NRRD and MetaImage have them.
+//! Text headers of keys and values, as in NRRD and MetaImage.
 
 use super::error::ReadError;
 use std::io::{BufRead, Read};
 use std::path::Path;
 use std::str::FromStr;
 
-/// A text header longer than this is none.
+/// Longer text, in bytes, is refused as a header.
 const LONGEST_HEADER: usize = 1 << 20;
 
 /// Reads lines, at most [`LONGEST_HEADER`] bytes of them.
@@ -20,7 +20,7 @@ impl<'a> Lines<'a> {
         Self { path, reader, left: LONGEST_HEADER }
     }
 
-    /// The next line without its end; `None` at the end of the file.
+    /// The next line without its line ending; `None` at the end of the file.
     pub fn next_line(&mut self) -> Result<Option<String>, ReadError> {
         let mut line = Vec::new();
         let mut limited = (&mut *self.reader).take(self.left as u64);
@@ -38,7 +38,7 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// The entries of a header; keys are compared without case and blanks.
+/// The entries of a header; keys are compared ignoring case and whitespace.
 #[derive(Debug)]
 pub(super) struct Fields<'a> {
     pub path: &'a Path,
@@ -50,7 +50,7 @@ impl<'a> Fields<'a> {
         Self { path, entries: Vec::new() }
     }
 
-    /// Whether two keys are one.
+    /// Whether two keys are the same.
     pub fn same(key: &str, other: &str) -> bool {
         plain(key) == plain(other)
     }
@@ -59,7 +59,7 @@ impl<'a> Fields<'a> {
         self.entries.push((plain(key), value.trim().to_string()));
     }
 
-    /// The value of the first of these keys that is there; of several equal keys the last.
+    /// The value of the first of these keys that is present; of repeated entries, the last.
     pub fn get(&self, keys: &[&str]) -> Option<&str> {
         keys.iter().find_map(|key| {
             let key = plain(key);
@@ -67,19 +67,19 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// A value that must be there.
+    /// A required value.
     pub fn need(&self, keys: &[&str], expected: &str) -> Result<&str, ReadError> {
         self.get(keys).ok_or_else(|| ReadError::missing(self.path, keys[0], expected))
     }
 
-    /// A single word or number.
+    /// The value parsed as a single word or number.
     pub fn one<T: FromStr>(&self, keys: &[&str], expected: &str) -> Result<Option<T>, ReadError> {
         self.get(keys)
             .map(|text| text.parse().map_err(|_| ReadError::header(self.path, keys[0], text, expected)))
             .transpose()
     }
 
-    /// Exactly `count` words, each made into a value.
+    /// Exactly `count` words, each parsed into a value.
     pub fn list<T>(
         &self,
         keys: &[&str],
@@ -108,13 +108,13 @@ fn plain(key: &str) -> String {
     key.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_lowercase).collect()
 }
 
-/// More slices than any scanner makes; a header that asks for more would take memory for their names alone.
+/// More slices than any scanner produces; names of more files would need too much memory.
 const MOST_FILES: usize = 1 << 16;
 
-/// The files that a header names by a pattern such as `slice%03d.raw`, for `first`, `first + step` ... `last`.
+/// The files that a header names by a pattern such as `slice%03d.raw`, numbered `first`, `first + step` ... `last`.
 ///
 /// # Errors
-/// [`ReadError::Header`] if the pattern has no number, or the numbers give no file or more than `most`.
+/// [`ReadError::Header`] if the pattern has no place for a number, or the numbers give no file or more than `most`.
 pub(super) fn numbered_files(
     path: &Path,
     key: &str,
@@ -127,7 +127,7 @@ pub(super) fn numbered_files(
     let (before, rest) = pattern.split_once('%').ok_or_else(|| wrong("a pattern with %d in it"))?;
     let end = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
     let (digits, rest) = rest.split_at(end);
-    let after = rest.strip_prefix(['d', 'i', 'u']).ok_or_else(|| wrong("a number as %d or %03d"))?;
+    let after = rest.strip_prefix(['d', 'i', 'u']).ok_or_else(|| wrong("a number such as %d or %03d"))?;
     let width: usize = if digits.is_empty() { 0 } else { digits.parse().unwrap_or(usize::MAX) };
     let span = last.checked_sub(first).filter(|span| step != 0 && span.signum() * step.signum() >= 0);
     let most = most.min(MOST_FILES);
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_never_more_than_files() {
+    fn the_number_of_files_is_limited() {
         let names = numbered_files(Path::new("test"), "data file", "%d", [1, 1 << 40, 1], usize::MAX);
         assert!(names.unwrap_err().to_string().contains("65536 files"));
     }

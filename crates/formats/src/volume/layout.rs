@@ -1,4 +1,4 @@
-//! From a stream of bytes to typed samples: which axes the file has, and which of them are kept.
+//! From a stream of bytes to typed samples: which axes the file has, and what is kept of them.
 
 use super::error::ReadError;
 use super::sample_type::{Endian, SampleType};
@@ -12,7 +12,7 @@ use tyndall::message::excerpt;
 use tyndall::volume::{Bricks, Voxels};
 
 /// # Errors
-/// [`ReadError::Memory`] if so many bytes more cannot be had.
+/// [`ReadError::Memory`] if `needed` more bytes are not available.
 pub(super) fn check_memory(path: &Path, needed: u64) -> Result<(), ReadError> {
     match available() {
         Some(available) if needed > available => {
@@ -22,13 +22,13 @@ pub(super) fn check_memory(path: &Path, needed: u64) -> Result<(), ReadError> {
     }
 }
 
-/// What an axis of a file runs over.
+/// What an axis of a file stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Axis {
     Space,
-    /// Components of one sample; the first is kept.
+    /// Components of one voxel; the first is kept.
     Channel,
-    /// Steps of time; the first is kept.
+    /// Time steps; the first is kept.
     Time,
 }
 
@@ -39,12 +39,12 @@ pub(super) struct Layout {
     pub axes: Vec<(usize, Axis)>,
     pub sample: SampleType,
     pub endian: Endian,
-    /// Numbers in words instead of bytes.
+    /// Whether samples are stored as text, not binary.
     pub text: bool,
 }
 
 impl Layout {
-    /// An array without zero axes whose size in bytes can be counted.
+    /// An array without axes of length zero, whose size in bytes does not overflow.
     ///
     /// # Errors
     /// [`ReadError::Header`] naming `key`.
@@ -64,7 +64,7 @@ impl Layout {
         Ok(Self { axes, sample, endian, text: false })
     }
 
-    /// Samples of all axes of that meaning.
+    /// The product of the lengths of all axes of that meaning.
     pub fn count(&self, meaning: Axis) -> usize {
         self.axes.iter().filter(|(_, axis)| *axis == meaning).map(|(n, _)| n).product()
     }
@@ -74,11 +74,11 @@ impl Layout {
         self.samples() as u64 * self.sample.size() as u64
     }
 
-    /// Bytes that the volume takes while it is loaded: in the file's order and in bricks, at once.
+    /// Peak bytes while the volume is loaded: it is held in the file's order and in bricks at the same time.
     fn memory(&self) -> u64 {
         let mut lengths = self.axes.iter().filter(|(_, axis)| *axis == Axis::Space).map(|(n, _)| *n);
         let mut dims = [1; 3].map(|one| lengths.next().unwrap_or(one));
-        // More than three axes of space are refused elsewhere; here they only must not be forgotten.
+        // More than three spatial axes are refused elsewhere; here they only have to be counted.
         dims[2] = dims[2].saturating_mul(lengths.product());
         let bricks = Bricks::bytes(dims, self.sample.size()).unwrap_or(u64::MAX);
         (self.count(Axis::Space) as u64 * self.sample.size() as u64).saturating_add(bricks)
@@ -115,7 +115,7 @@ impl Layout {
         let mut slower = self.samples();
         for &(n, axis) in &self.axes {
             slower /= n;
-            // Nothing is wanted past the first block of a slowest axis: no need to read on.
+            // On the slowest axis only the first block is kept, so reading stops after it: no need to skip.
             if axis != Axis::Space && n > 1 && slower > 1 {
                 reader = Box::new(BufReader::new(Every::new(reader, inner, inner * n)));
             }
@@ -162,7 +162,7 @@ impl Layout {
         Ok(data)
     }
 
-    /// Whether the sample is of the first channel at the first time.
+    /// Whether the sample is in the first channel at the first time.
     fn keeps(&self, mut index: usize) -> bool {
         self.axes.iter().all(|&(n, axis)| {
             let here = index % n;
@@ -172,7 +172,7 @@ impl Layout {
     }
 }
 
-/// Makes voxels of the type that a [`SampleType`] names from an expression that gives any vector.
+/// Makes [`Voxels`] of the type that a [`SampleType`] names; `$data` is an expression generic in its element type.
 macro_rules! of_type {
     ($sample:expr, $data:expr) => {
         match $sample {
@@ -189,7 +189,7 @@ macro_rules! of_type {
 }
 use of_type;
 
-/// Why the samples ended early.
+/// Why reading the samples stopped early.
 enum Stop {
     Short { found: u64, expected: u64 },
     Trouble(io::Error),
@@ -213,8 +213,8 @@ impl Stop {
     }
 }
 
-/// Reads `count` samples as they lie. Unless they are known to be all there the memory grows with
-/// what arrives, so that a header that lies costs no more than its file holds.
+/// Reads `count` samples in the file's order. Unless all are known to be there, memory grows with what
+/// arrives, so that a header with a wrong size costs no more than its file holds.
 fn read_vec<T: Pod>(reader: &mut dyn Read, count: usize, all_there: bool) -> Result<Vec<T>, Stop> {
     let size = size_of::<T>();
     let expected = count as u64 * size as u64;
@@ -233,12 +233,12 @@ fn read_vec<T: Pod>(reader: &mut dyn Read, count: usize, all_there: bool) -> Res
     Ok(data)
 }
 
-/// Lets a decoder reach the end of its stream, where its checksum stands.
+/// Lets a decoder reach the end of its stream, where it verifies the checksum.
 fn check_end(path: &Path, reader: &mut dyn BufRead) -> Result<(), ReadError> {
     reader.fill_buf().map(|_| ()).map_err(|error| Stop::Trouble(error).at(path))
 }
 
-/// Turns the bytes of every sample round.
+/// Reverses the byte order of every sample.
 fn swap_bytes(voxels: &mut Voxels) {
     fn two<T: Pod>(data: &mut [T]) {
         bytemuck::cast_slice_mut::<T, u16>(data).iter_mut().for_each(|v| *v = v.swap_bytes());
@@ -259,7 +259,7 @@ fn swap_bytes(voxels: &mut Voxels) {
     }
 }
 
-/// The next run of bytes between blanks and commas, cut at 64; empty at the end.
+/// The next word, delimited by whitespace or commas and cut at 64 bytes; empty at the end.
 fn next_word(reader: &mut dyn BufRead) -> io::Result<String> {
     let mut word = Vec::new();
     loop {
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_channel_at_the_first_time_is_kept_wherever_its_axis_stands() {
+    fn the_first_channel_at_the_first_time_is_kept_whatever_the_order_of_axes() {
         use Axis::{Channel, Space, Time};
         type Case = (&'static [(usize, Axis)], &'static [u16]);
         let cases: [Case; 5] = [
@@ -323,13 +323,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_is_counted() {
+    fn a_short_file_is_reported_with_its_size() {
         let error = read(&layout(&[(10, Axis::Space)]), &[0; 13]).unwrap_err();
         assert!(matches!(error, ReadError::Short { found: 13, expected: 20, .. }), "{error}");
     }
 
     #[test]
-    fn sizes_that_cannot_be_are_refused() {
+    fn impossible_sizes_are_refused() {
         for sizes in [[0, 5], [1 << 40, 1 << 40]] {
             let axes = sizes.map(|n| (n, Axis::Space)).to_vec();
             let made = Layout::new(Path::new("test"), "sizes", axes, SampleType::U8, Endian::Little);

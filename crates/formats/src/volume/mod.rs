@@ -1,9 +1,9 @@
 //! Volume files: NRRD, NIfTI, MetaImage, NumPy arrays and raw samples.
 //!
-//! Every reader gives the grid in Tyndall's world (anatomical files in LPS millimetres), the samples in
-//! the type that the file has, and the map from them to data values. Of several channels or time steps
-//! the first is read. A file that is damaged, cut short or lies about its size gives a [`ReadError`];
-//! memory grows with what the file really holds.
+//! Every reader returns the grid in Tyndall's world (anatomical files in LPS millimetres), the samples in
+//! the file's type, and the map from samples to data values. Of several channels or time steps only the
+//! first is read. A file that is damaged, cut short or states a wrong size gives a [`ReadError`];
+//! memory use grows with what the file actually holds.
 
 mod detached;
 mod error;
@@ -25,7 +25,7 @@ pub use sample_type::{Endian, SampleType, UnknownName};
 use std::path::Path;
 use tyndall::volume::{Grid, ValueMap, Volume, Voxels};
 
-/// A volume and what else its file said.
+/// A volume, and what else its file contained.
 #[derive(Clone, Debug)]
 pub struct Loaded {
     /// The first channel at the first time.
@@ -34,14 +34,14 @@ pub struct Loaded {
     pub channels: usize,
     /// Time steps in the file.
     pub times: usize,
-    /// What a user should know: parts of the file that were left out, guesses, doubts.
+    /// What the user should know: skipped parts of the file, assumptions, inconsistencies.
     pub notes: Vec<String>,
 }
 
-/// Reads a volume of any known kind; the first bytes tell which, whatever the file's name.
+/// Reads a volume of any known kind, recognised by the first bytes, otherwise by the file's name.
 ///
 /// # Errors
-/// [`ReadError`] if the file is missing, of no known kind, damaged, or too large for the memory.
+/// [`ReadError`] if the file is missing, of no known kind, damaged, or too large for memory.
 pub fn read(path: &Path) -> Result<Loaded, ReadError> {
     match kind(path)? {
         Some(Kind::Nrrd) => nrrd::read(path),
@@ -60,8 +60,8 @@ enum Kind {
     Numpy,
 }
 
-/// The kind by the first bytes; by the name for what has no mark there: the samples of a NIfTI pair, and
-/// MetaImage headers that begin unusually.
+/// The kind by the first bytes; by the name for files that have no signature there: the samples of a NIfTI
+/// pair, and MetaImage headers that begin unusually.
 fn kind(path: &Path) -> Result<Option<Kind>, ReadError> {
     let head = stream::fill_head(path)?;
     if head.starts_with(b"NRRD00") {
@@ -87,7 +87,7 @@ fn kind(path: &Path) -> Result<Option<Kind>, ReadError> {
     })
 }
 
-/// What a reader found, before the volume derives its ranges.
+/// What a reader found, before the [`Volume`] is built and its ranges computed.
 struct Parsed {
     grid: Grid,
     voxels: Voxels,
@@ -109,7 +109,7 @@ impl Parsed {
         let volume = Volume::new(grid, voxels, values)
             .map_err(|source| ReadError::Volume { path: path.into(), source })?;
         let range = volume.value_range();
-        // Not so for NaN, which slope and intercept can make of two infinities.
+        // False for NaN, which slope and intercept can produce from two infinities.
         let fits = |value: &f64| value.abs() <= f64::from(f32::MAX);
         if !range.iter().all(fits) {
             return Err(ReadError::Values { path: path.into(), range });
@@ -124,7 +124,7 @@ mod tests {
     use std::path::PathBuf;
     use tempfile::TempDir;
 
-    /// A file in a folder of its own, which lives as long as the first value.
+    /// A file in a folder of its own, which exists until the first value is dropped.
     pub(super) fn folder_with(name: &str, bytes: &[u8]) -> (TempDir, PathBuf) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(name);
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_volume_is_told() {
+    fn a_file_that_is_not_a_volume_is_reported() {
         let (folder, path) = folder_with("a.txt", b"hello");
         let message = read(&path).unwrap_err().to_string();
         assert!(

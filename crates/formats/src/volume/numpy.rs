@@ -1,7 +1,7 @@
 //! NumPy arrays (`.npy`, format versions 1 to 3), indexed `[z][y][x]`.
 //!
-//! The header is a line of Python that this reader takes apart itself: what a general reader adds, it
-//! would add element by element, where samples here are read in one block.
+//! The header is a line of Python, which is parsed here: a general NumPy library would read element by
+//! element, whereas here samples are read in one block.
 
 use super::error::ReadError;
 use super::layout::{Axis, Layout, check_memory};
@@ -12,9 +12,9 @@ use std::io::Read;
 use std::path::Path;
 use tyndall::volume::{Bricks, Grid, ValueMap, Voxels};
 
-/// A header longer than this is none.
+/// Longer headers, in bytes, are refused.
 const LONGEST_HEADER: u32 = 1 << 20;
-/// A last axis of four that is no longer than this holds channels.
+/// If the last of four or five axes is at most this long, it holds channels.
 const MOST_CHANNELS: usize = 4;
 
 /// Reads a `.npy` file.
@@ -28,7 +28,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
         value => return Err(ReadError::header(path, "fortran_order", value, "True or False")),
     };
     let shape = shape(path, entry(path, &text, "shape")?)?;
-    // Axes as the array is indexed, last one fastest in C order.
+    // Axes in the order in which the array is indexed; in C order the last is fastest.
     let mut axes = meanings(path, &shape)?;
     let spatial: Vec<usize> = axes.iter().filter(|(_, a)| *a == Axis::Space).map(|(n, _)| *n).rev().collect();
     let dims = std::array::from_fn(|i| spatial.get(i).copied().unwrap_or(1));
@@ -53,7 +53,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
     Parsed { grid, voxels, values: ValueMap::IDENTITY, channels, times, notes: Vec::new() }.load(path)
 }
 
-/// The dictionary that stands before the samples.
+/// The dictionary before the samples, as text.
 fn header(path: &Path, file: &mut dyn Read) -> Result<String, ReadError> {
     let trouble = |source| ReadError::io(path, source);
     let cut = |_| ReadError::missing(path, "header", "a NumPy header");
@@ -90,7 +90,7 @@ fn header(path: &Path, file: &mut dyn Read) -> Result<String, ReadError> {
     Ok(String::from_utf8_lossy(&text).into_owned())
 }
 
-/// The text of an entry of the dictionary, to the dictionary's end.
+/// The text from an entry's value to the end of the dictionary.
 fn entry<'a>(path: &Path, text: &'a str, key: &str) -> Result<&'a str, ReadError> {
     ['\'', '"']
         .iter()
@@ -100,16 +100,16 @@ fn entry<'a>(path: &Path, text: &'a str, key: &str) -> Result<&'a str, ReadError
         .ok_or_else(|| ReadError::missing(path, key, "an entry of the header"))
 }
 
-/// What the samples are in the file.
+/// How samples are stored in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stored {
     As(SampleType),
-    /// Half precision, which is widened to single.
+    /// Half precision, which is converted to single.
     Half,
 }
 
 impl Stored {
-    /// The type that takes the file's bytes.
+    /// The type as which the file's bytes are read.
     fn raw(self) -> SampleType {
         match self {
             Self::As(sample) => sample,
@@ -157,7 +157,7 @@ fn shape(path: &Path, text: &str) -> Result<Vec<usize>, ReadError> {
     words.map(|word| word.trim_end_matches('L').parse().map_err(|_| wrong())).collect()
 }
 
-/// Of four axes a short last one holds channels; else the first one is time.
+/// Of four axes, a short last one holds channels; otherwise the first one is time.
 fn meanings(path: &Path, shape: &[usize]) -> Result<Vec<(usize, Axis)>, ReadError> {
     let mut axes: Vec<(usize, Axis)> = shape.iter().map(|&n| (n, Axis::Space)).collect();
     match shape {
@@ -186,7 +186,7 @@ fn widen(voxels: Voxels) -> Voxels {
     }
 }
 
-/// From z fastest, as Fortran order lays `[z][y][x]` down, to x fastest.
+/// From z fastest, as Fortran order stores `[z][y][x]`, to x fastest.
 fn transposed(voxels: Voxels, dims: [usize; 3]) -> Voxels {
     fn turn<T: Copy>(data: &[T], [nx, ny, nz]: [usize; 3]) -> Vec<T> {
         let mut turned = Vec::with_capacity(data.len());

@@ -1,4 +1,4 @@
-//! From the steps between voxels that a file states to a [`Grid`].
+//! Builds a [`Grid`] from the steps between voxels that a file states.
 
 use super::error::ReadError;
 use std::path::Path;
@@ -7,7 +7,7 @@ use tyndall::volume::{Grid, Space};
 type Vector = [f64; 3];
 
 /// The grid whose index axis `j` advances by `steps[j]` in the world. Axes that the file lacks have one
-/// voxel and no step: they get a unit step across the others.
+/// voxel and no step: they get a unit step perpendicular to the others.
 pub(super) fn grid(
     path: &Path,
     dims: [usize; 3],
@@ -16,7 +16,7 @@ pub(super) fn grid(
     space: Space,
 ) -> Result<Grid, ReadError> {
     for axis in 0..3 {
-        // A lone voxel's step is arbitrary; one of length zero is the same as none.
+        // The step of a single voxel is arbitrary; a zero step is treated as none.
         if dims[axis] == 1 && steps[axis].is_some_and(|v| length(v) == 0.0) {
             steps[axis] = None;
         }
@@ -34,12 +34,12 @@ pub(super) fn grid(
         .map_err(|source| ReadError::Grid { path: path.into(), source })
 }
 
-/// A unit vector across those given; the nearest axis's own where they leave a choice.
+/// A unit vector perpendicular to those given and, where that leaves a choice, to a world axis.
 fn across(next: Option<Vector>, after: Option<Vector>) -> Vector {
     match (next, after) {
         (Some(a), Some(b)) => normalised(cross(a, b)),
         (Some(v), None) | (None, Some(v)) => {
-            // The axis on which `v` is shortest is the one least along it.
+            // The axis along which `v` has its smallest component is the most perpendicular to it.
             let shortest = (0..3).min_by(|&i, &j| v[i].abs().total_cmp(&v[j].abs())).unwrap_or(2);
             let mut axis = [0.0; 3];
             axis[shortest] = 1.0;
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn missing_axes_stand_across_the_others() {
+    fn missing_axes_are_perpendicular_to_the_others() {
         let made = |steps, dims| grid(Path::new("test"), dims, steps, [0.0; 3], Space::Plain);
         let plane = made([Some([2.0, 0.0, 0.0]), Some([0.0, 0.0, 3.0]), None], [4, 5, 1]).unwrap();
         assert_eq!(plane.spacing(), [2.0, 3.0, 1.0]);

@@ -19,16 +19,16 @@ pub struct RawLayout {
     pub endian: Endian,
     /// Bytes before the first sample.
     pub offset: u64,
-    /// Distance of voxel centres, world units.
+    /// Distance between voxel centres, in world units.
     pub spacing: [f64; 3],
-    /// World place of the centre of voxel (0, 0, 0); without one the box is centred on the world origin.
+    /// World position of the centre of voxel (0, 0, 0); if `None`, the box is centred on the world origin.
     pub origin: Option<[f64; 3]>,
 }
 
-/// Reads a file that holds nothing but samples, after `offset` bytes of anything.
+/// Reads a file that holds only samples, after `offset` bytes that are skipped.
 ///
 /// # Errors
-/// [`ReadError`] if the file cannot be read, is shorter than the layout asks for, or the layout is impossible.
+/// [`ReadError`] if the file cannot be read or is shorter than the layout requires, or if the layout is impossible.
 pub fn read_raw(path: &Path, raw: &RawLayout) -> Result<Loaded, ReadError> {
     let grid = match raw.origin {
         None => Grid::centred(raw.dims, raw.spacing),
@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_after_an_offset_lie_centred_or_where_told() {
+    fn samples_after_an_offset_are_centred_unless_an_origin_is_given() {
         let mut bytes = vec![9_u8; 3];
         bytes.extend([-1_i16, 2, 300, -400, 5, 6].iter().flat_map(|v| v.to_be_bytes()));
         let (_folder, path) = folder_with("a.raw", &bytes);
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn a_layout_that_the_file_does_not_hold_is_refused_at_once() {
+    fn a_layout_larger_than_the_file_is_refused_at_once() {
         let (_folder, path) = folder_with("a.raw", &[0; 14]);
         let short = read_raw(&path, &layout()).unwrap_err();
         assert!(matches!(short, ReadError::Short { found: 11, expected: 12, .. }), "{short}");

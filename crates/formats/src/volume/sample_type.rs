@@ -54,7 +54,7 @@ impl SampleType {
 pub struct UnknownName {
     /// The word.
     pub found: String,
-    /// The words that may stand there.
+    /// The words that are allowed.
     pub expected: &'static str,
 }
 

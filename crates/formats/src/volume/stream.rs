@@ -1,4 +1,4 @@
-//! Bytes of a file: opened, skipped through, decompressed.
+//! Opens files, skips to their samples and decompresses them.
 
 use super::error::ReadError;
 use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom, Take};
 use std::path::{Path, PathBuf};
 
-/// What every gzip stream begins with.
+/// The first bytes of every gzip stream.
 pub(super) const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 /// How the samples were compressed.
@@ -16,16 +16,16 @@ pub(super) enum Coding {
     Raw,
     Gzip,
     Bzip2,
-    /// zlib, or gzip if the stream begins so.
+    /// zlib, or gzip if the stream begins with its signature.
     Zlib,
 }
 
 impl Coding {
-    /// No file becomes so many times longer: a header that asks for more lies, and is told so before the work.
+    /// Upper limit of the compression ratio: a header that needs more is wrong, and is refused before decompression.
     fn largest_factor(self) -> u64 {
         match self {
             Self::Raw => 1,
-            // Two bits for 258 bytes, and blocks begin with a few.
+            // Two bits for 258 bytes, plus a few bytes at the start of each block.
             Self::Gzip | Self::Zlib => 1100,
             // A block of 900,000 bytes, each five of which repeat one byte 259 times, in some 40 bytes.
             Self::Bzip2 => 2_000_000,
@@ -36,23 +36,23 @@ impl Coding {
 /// Where in a file the samples begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Start {
-    /// As many bytes after the present position; after decompression.
+    /// This many bytes past the current position, counted after decompression.
     After(u64),
-    /// So that they end where the file ends; not compressed.
+    /// Such that they end where the file ends; only if not compressed.
     AtEnd,
 }
 
-/// The samples' bytes from the first one on.
+/// The bytes of the samples, from the first sample on.
 pub(super) struct Stream<'a> {
     pub reader: Box<dyn BufRead + 'a>,
-    /// Bytes left, where they are not compressed and therefore known.
+    /// Bytes left; known only if they are not compressed.
     pub available: Option<u64>,
 }
 
 /// Opens a regular file that is not empty.
 pub(super) fn open(path: &Path) -> Result<BufReader<File>, ReadError> {
     let trouble = |source| ReadError::io(path, source);
-    // Asked before opening: opening a pipe would wait for its other end.
+    // Checked before opening: opening a pipe would block until its other end is opened.
     let meta = std::fs::metadata(path).map_err(trouble)?;
     if !meta.is_file() {
         let found = if meta.is_dir() { "a folder" } else { "a pipe or a device" };
@@ -64,20 +64,20 @@ pub(super) fn open(path: &Path) -> Result<BufReader<File>, ReadError> {
     Ok(BufReader::with_capacity(1 << 16, File::open(path).map_err(trouble)?))
 }
 
-/// The first bytes of a file, decompressed if it begins as gzip does; fewer where it is shorter.
+/// The first 1024 bytes of a file, decompressed if it is gzip; fewer if it is shorter.
 pub(super) fn fill_head(path: &Path) -> Result<Vec<u8>, ReadError> {
     let trouble = |source| ReadError::io(path, source);
     let mut file = open(path)?;
     let gzip = file.fill_buf().map_err(trouble)?.starts_with(&GZIP);
     let mut reader = decode(file, if gzip { Coding::Gzip } else { Coding::Raw }).map_err(trouble)?;
     let mut head = vec![0; 1024];
-    // A damaged stream is told about by the reader that is chosen by the name.
+    // Damage is not reported here but by the reader that is then chosen by the file's name.
     let got = fill(&mut *reader, &mut head).unwrap_or(0);
     head.truncate(got);
     Ok(head)
 }
 
-/// The bytes from `start` on; `needed` is how many samples' bytes the header asks for.
+/// The bytes from `start` on; `needed` is the number of bytes of samples that the header states.
 pub(super) fn samples(
     path: &Path,
     mut file: BufReader<File>,
@@ -114,7 +114,7 @@ pub(super) fn samples(
     Ok(Stream { reader: Box::new(file), available: Some(length - begin) })
 }
 
-/// The decompressed bytes from the present position on.
+/// The decompressed bytes from the current position on.
 pub(super) fn decode(mut file: BufReader<File>, coding: Coding) -> io::Result<Box<dyn BufRead>> {
     const CHUNK: usize = 1 << 17;
     let coding = match coding {
@@ -129,9 +129,9 @@ pub(super) fn decode(mut file: BufReader<File>, coding: Coding) -> io::Result<Bo
     })
 }
 
-/// Reads until `out` is full or the stream ends; returns the bytes got.
+/// Reads until `out` is full or the stream ends; returns the number of bytes read.
 ///
-/// Decoders report a stream that stops in its middle as an early end: to the caller it is one.
+/// A decoder reports a truncated stream as `UnexpectedEof`, which is treated as the end of the stream.
 pub(super) fn fill(reader: &mut dyn Read, mut out: &mut [u8]) -> io::Result<usize> {
     let asked = out.len();
     while !out.is_empty() {
@@ -151,7 +151,7 @@ pub(super) fn fill(reader: &mut dyn Read, mut out: &mut [u8]) -> io::Result<usiz
     Ok(asked - out.len())
 }
 
-/// Keeps the first `keep` bytes of every `period` bytes: the first channel of interleaved ones.
+/// Keeps the first `keep` of every `period` bytes: the first of several interleaved channels.
 pub(super) struct Every<R> {
     inner: R,
     keep: usize,
@@ -160,7 +160,7 @@ pub(super) struct Every<R> {
 }
 
 impl<R: BufRead> Every<R> {
-    /// `0 < keep <= period`.
+    /// Requires `0 < keep <= period`.
     pub fn new(inner: R, keep: usize, period: usize) -> Self {
         assert!(0 < keep && keep <= period, "keep {keep} of {period}");
         Self { inner, keep, period, position: 0 }
@@ -198,7 +198,7 @@ impl<R: BufRead> Read for Every<R> {
     }
 }
 
-/// Several files one after the other, each with the same number of bytes; opened when reached.
+/// Several files read one after the other, the same number of bytes from each; each is opened when reached.
 pub(super) struct Parts<F> {
     left: VecDeque<PathBuf>,
     bytes_each: u64,
@@ -207,7 +207,7 @@ pub(super) struct Parts<F> {
 }
 
 impl<F: FnMut(&Path) -> Result<Stream<'static>, ReadError>> Parts<F> {
-    /// `open` gives the samples' bytes of a file.
+    /// `open` returns the bytes of a file's samples.
     pub fn new(files: Vec<PathBuf>, bytes_each: u64, open: F) -> Self {
         Self { left: files.into(), bytes_each, open, current: None }
     }

@@ -1,9 +1,9 @@
-//! What the tests of files share.
+//! Helpers shared by the tests of files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// An empty folder of the test's own.
+/// An empty folder for one test.
 pub fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
     if folder.exists() {
@@ -13,7 +13,7 @@ pub fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Writes a file anew; writing over it instead can make the file system wait for the disk each time.
+/// Deletes and rewrites a file; overwriting it in place can make the file system wait for the disk each time.
 pub fn rewrite(path: &Path, bytes: &[u8]) {
     if path.exists() {
         fs::remove_file(path).expect("the last file can go");
@@ -21,7 +21,7 @@ pub fn rewrite(path: &Path, bytes: &[u8]) {
     fs::write(path, bytes).expect("a new file");
 }
 
-/// Hands `try_file` three thousand copies of a file with three bytes changed, from a fixed sequence (Knuth's MMIX generator).
+/// Calls `try_file` on 3000 copies of a file with three bytes changed, by a fixed sequence (Knuth's MMIX generator).
 pub fn for_damaged_copies(bytes: &[u8], path: &Path, try_file: impl Fn(&Path)) {
     let mut state = 1_u64;
     for _ in 0..3000 {

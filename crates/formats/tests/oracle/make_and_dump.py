@@ -78,7 +78,7 @@ class Dump:
         })
 
     def as_itk_reads(self, name, path=None, **more):
-        """What SimpleITK reads: of vectors the first component, of four axes the first step."""
+        """Adds what SimpleITK reads: the first component of vectors, the first time step of four axes."""
         image = sitk.ReadImage(str(path or self.folder / name))
         values = sitk.GetArrayFromImage(image)
         if image.GetNumberOfComponentsPerPixel() > 1:
@@ -99,7 +99,7 @@ class Dump:
         self.add(name, values, spacing[:3], direction[:3, :3], origin[:3], **more)
 
     def as_nibabel_reads(self, name, millimetres=1.0, path=None, **more):
-        """What nibabel reads, taken from RAS to LPS."""
+        """Adds what nibabel reads, converted from RAS to LPS."""
         image = nibabel.load(path or self.folder / name)
         values = np.asarray(image.dataobj)
         if values.dtype.names:
@@ -171,7 +171,7 @@ def write_nrrd(dump):
     header = {**oblique, "space directions": directions, "kinds": ["domain"] * 3 + ["list"]}
     array = samples("uint8", (*DIMS, 5))
     dump.add(put("list_last.nrrd", array, header), array[..., 0], SPACING, OBLIQUE, ORIGIN, channels=5)
-    # By hand, what pynrrd does not write.
+    # Written by hand: variants that pynrrd does not write.
     array = samples("int16")
     raw = array.flatten(order="F").astype(">i2").tobytes()
     head = ("NRRD0003\r\n# a comment\r\nkey:=value with: colons\r\ntype: signed short int\r\ndimension: 3\r\n"
@@ -222,15 +222,15 @@ def write_nifti(dump):
         for dtype in TYPES:
             for endian, order in [("<", "little"), (">", "big")]:
                 for ending, pair in [("nii", False), ("nii.gz", False), ("hdr", True), ("hdr.gz", True)]:
-                    # A stem of its own: ITK would take a.nii for a.nii.gz where both are.
+                    # Each stem is unique: ITK would read a.nii instead of a.nii.gz if both exist.
                     name = f"v{version}_{dtype}_{order}_{ending.replace('.', '_')}.{ending}"
                     put(name, samples(dtype), ras(OBLIQUE), version, pair, endian)
-                    if version == 1:  # ITK knows no NIfTI-2
+                    if version == 1:  # ITK does not read NIfTI-2
                         dump.as_itk_reads(name)
                     else:
                         dump.as_nibabel_reads(name)
         for dtype in ["uint8", "int16", "float32"]:
-            # nibabel would rescale what it saves: the slope is set in the file afterwards.
+            # nibabel would rescale the samples when saving, so the slope is set in the file afterwards.
             name = put(f"v{version}_slope_{dtype}.nii", samples(dtype), ras(OBLIQUE), version)
             with open(dump.folder / name, "r+b") as file:
                 file.seek(112 if version == 1 else 176)
@@ -239,7 +239,7 @@ def write_nifti(dump):
     for kind, matrix in [("axes", IDENTITY), ("oblique", OBLIQUE), ("permuted", PERMUTED), ("mirrored", MIRRORED)]:
         for form in ["sform", "qform", "both"]:
             def forms(image, form=form, affine=ras(matrix)):
-                # Setting a form changes the image's own affine: it cannot be asked for here.
+                # Setting a form changes the image's own affine, so it cannot be read from the image here.
                 image.set_sform(*((None, 0) if form == "qform" else (affine, 1)))
                 image.set_qform(*((None, 0) if form == "sform" else (affine, 1)))
             name = put(f"{form}_{kind}.nii", samples("int16"), ras(matrix), prepare=forms)
@@ -260,7 +260,7 @@ def write_nifti(dump):
     dump.as_nibabel_reads(put("no_form.nii", samples("int16"), None, prepare=no_form))
     for unit in ["meter", "mm", "micron"]:
         dump.as_itk_reads(put(f"unit_{unit}.nii", samples("int16"), ras(OBLIQUE), prepare=lambda i, u=unit: i.header.set_xyzt_units(u)))
-    # Both pairs beside each other: the compressed header goes with the compressed samples.
+    # Both pairs in one folder: the compressed header belongs to the compressed samples.
     for ending in ["hdr", "hdr.gz"]:
         put(f"twins.{ending}", samples("int16"), ras(OBLIQUE), pair=True)
     for ending in ["hdr", "hdr.gz"]:
@@ -299,7 +299,7 @@ def write_meta(dump):
     series = sitk.JoinSeries([sitk.GetImageFromArray(samples("int16").T.copy()) for _ in range(3)])
     sitk.WriteImage(series, str(dump.folder / "series.mha"))
     dump.as_itk_reads("series.mha")
-    # By hand, what SimpleITK does not write.
+    # Written by hand: variants that SimpleITK does not write.
     head = ("NDims = 3\nDimSize = 7 5 4\nElementSize = 0.5 1.25 3\nPosition = 1 2 3\n"
             f"Rotation = {' '.join(str(v) for v in OBLIQUE.T.flatten())}\n")
     for dtype, met in [("int16", "MET_SHORT"), ("float32", "MET_FLOAT"), ("float64", "MET_DOUBLE")]:

@@ -1,11 +1,11 @@
-//! Small valid files of every kind that is read, in its variants, and the words of their headers.
+//! Small valid files of every kind that is read, in several variants, and fragments of headers to insert.
 
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, WritableImage, f16};
 use flate2::{Compression, write::GzEncoder, write::ZlibEncoder};
 use std::io::{Cursor, Write};
 use tyndall_formats::image::{Display, Metadata, Picture, write};
 
-/// A name and what is in it.
+/// A file's name and content.
 type File = (&'static str, Vec<u8>);
 
 pub const NRRD_WORDS: &[&str] = &[
@@ -166,7 +166,7 @@ fn samples() -> Vec<u8> {
     (0..48).map(|v| v * 5).collect()
 }
 
-/// 24 samples of single precision, two of which are no numbers.
+/// 24 single-precision samples, two of which are not finite.
 fn floats() -> Vec<u8> {
     let value = |i: u8| [f32::NAN, f32::NEG_INFINITY, f32::from(i)][usize::from(i).min(2)];
     (0..24).flat_map(|i| value(i).to_le_bytes()).collect()
@@ -201,7 +201,7 @@ pub fn nrrd() -> Vec<File> {
 pub fn nifti() -> Vec<File> {
     let one = nifti_file(1);
     let mut placed = one.clone();
-    // Quaternion and rows, with slope and intercept and units.
+    // Quaternion and matrix rows, with slope, intercept and units.
     placed[252..256].copy_from_slice(&[1, 0, 2, 0]);
     for (at, value) in
         [(76, 1.0_f32), (80, 2.0), (84, 0.5), (88, 3.0), (112, 2.0), (116, -5.0), (256, 0.1), (268, 9.0)]
@@ -293,7 +293,7 @@ pub fn numpy() -> Vec<File> {
     ]
 }
 
-/// A picture of four pixels in every kind, with long and short metadata.
+/// A picture of four pixels in every kind, with long and short metadata texts.
 pub fn pictures() -> Vec<File> {
     let folder = tempfile::tempdir().expect("a folder");
     let picture = Picture {

@@ -5,10 +5,10 @@ use super::super::fields::{Fields, Lines};
 use std::io::BufRead;
 use std::path::Path;
 
-/// Keys with which headers begin in practice.
+/// Keys that headers begin with in practice.
 const FIRST_KEYS: [&str; 5] = ["ObjectType", "ObjectSubType", "NDims", "Comment", "TransformType"];
 
-/// Whether a file that begins so is a MetaImage.
+/// Whether a file that begins with `head` is a MetaImage.
 pub(in super::super) fn recognises(head: &[u8]) -> bool {
     let text = String::from_utf8_lossy(head);
     let first = text.trim_start().lines().next().and_then(|line| line.split_once('='));
@@ -18,11 +18,11 @@ pub(in super::super) fn recognises(head: &[u8]) -> bool {
 /// The fields, and the data files if the header lists them.
 pub(super) struct Header<'a> {
     pub fields: Fields<'a>,
-    /// Names after `ElementDataFile = LIST`.
+    /// File names after `ElementDataFile = LIST`.
     pub listed: Vec<String>,
 }
 
-/// Reads up to and with the line of `ElementDataFile`.
+/// Reads up to and including the line of `ElementDataFile`, and any list after it.
 pub(super) fn read<'a>(path: &'a Path, reader: &mut dyn BufRead) -> Result<Header<'a>, ReadError> {
     let mut lines = Lines::new(path, reader);
     let mut fields = Fields::new(path);

@@ -16,7 +16,7 @@ pub(super) use header::recognises;
 use std::path::Path;
 use tyndall::volume::{Grid, Space, ValueMap};
 
-/// More axes than MetaImage allows.
+/// Most axes that MetaImage allows.
 const MOST_AXES: usize = 10;
 
 /// Reads a `.mha` or `.mhd` file.
@@ -49,7 +49,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
     };
     let value = fields.need(&["ElementDataFile"], "LOCAL, or the name of the file with the samples")?;
     let voxels = if value.eq_ignore_ascii_case("LOCAL") {
-        // A size of the header counts from the file's beginning.
+        // `HeaderSize` counts from the beginning of the file.
         let file = if start.is_some() { stream::open(path)? } else { file };
         let start = start.unwrap_or(Start::After(0));
         layout.read(path, stream::samples(path, file, coding, start, layout.bytes())?)?
@@ -83,7 +83,7 @@ fn sizes(fields: &Fields) -> Result<Vec<usize>, ReadError> {
 }
 
 /// The grid of the first three axes. The matrix is stored axis by axis: its first `NDims` numbers
-/// are the direction in which the first index axis runs.
+/// are the direction of the first index axis.
 fn grid(fields: &Fields, sizes: &[usize]) -> Result<Grid, ReadError> {
     let count = sizes.len();
     let spacing =
@@ -101,7 +101,7 @@ fn grid(fields: &Fields, sizes: &[usize]) -> Result<Grid, ReadError> {
     };
     let dims = std::array::from_fn(|axis| sizes.get(axis).copied().unwrap_or(1));
     let origin = std::array::from_fn(|i| origin.get(i).copied().unwrap_or(0.0));
-    // ITK states the orientation of every volume that it writes; `???` and silence mean that none is known.
+    // ITK states the orientation of every volume it writes; `???` or no entry means that it is unknown.
     let space = match fields.get(&["AnatomicalOrientation"]) {
         None | Some("" | "???") => Space::Plain,
         Some(_) => Space::Anatomical,
@@ -113,7 +113,7 @@ fn number(fields: &Fields, key: &str, default: f64) -> Result<f64, ReadError> {
     Ok(fields.numbers(&[key], 1)?.map_or(default, |numbers| numbers[0]))
 }
 
-/// True or False, of which MetaIO looks at the first letter.
+/// True or False; only the first letter counts, as in MetaIO.
 fn yes(fields: &Fields, keys: &[&str], default: bool) -> Result<bool, ReadError> {
     match fields.get(keys).map(|text| (text, text.chars().next())) {
         None => Ok(default),

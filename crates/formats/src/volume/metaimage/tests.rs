@@ -56,7 +56,7 @@ fn the_matrix_holds_the_directions_axis_by_axis() {
 }
 
 #[test]
-fn of_channels_and_times_the_first_is_read() {
+fn the_first_channel_at_the_first_time_is_read() {
     let header = "NDims = 4\nDimSize = 2 1 1 3\nElementNumberOfChannels = 2\nElementType = MET_UCHAR_ARRAY\n";
     let loaded = load(header, &(0..12).collect::<Vec<u8>>()).unwrap();
     assert_eq!(loaded.volume.voxels(), Voxels::U8(vec![0, 2]));

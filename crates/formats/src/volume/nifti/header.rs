@@ -7,16 +7,16 @@ use std::path::Path;
 const SIZE_1: usize = 348;
 const SIZE_2: usize = 540;
 
-/// Where the samples lie.
+/// Where the samples are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Storage {
-    /// Behind the header.
+    /// After the header, in the same file.
     Single,
     /// In the `.img` file.
     Pair,
 }
 
-/// The entries that both versions have, in the widest type.
+/// The entries that both versions have, each in the wider of their types.
 #[derive(Clone, Debug)]
 pub(super) struct Header {
     pub endian: Endian,
@@ -38,12 +38,12 @@ pub(super) struct Header {
     pub sform: [[f64; 4]; 3],
 }
 
-/// Whether a file that begins so is NIfTI, or its forerunner Analyze, about which the reader then tells.
+/// Whether a file that begins with `head` is NIfTI or its predecessor Analyze, which the reader then refuses.
 pub(in super::super) fn recognises(head: &[u8]) -> bool {
     version(head).is_some()
 }
 
-/// The size of the header and the byte order, by its first number.
+/// The size of the header and the byte order, from its first number.
 fn version(head: &[u8]) -> Option<(usize, Endian)> {
     let first: [u8; 4] = head.get(..4)?.try_into().ok()?;
     for (endian, number) in
@@ -58,7 +58,7 @@ fn version(head: &[u8]) -> Option<(usize, Endian)> {
     None
 }
 
-/// Numbers at fixed places of a header that is long enough.
+/// Reads numbers at fixed positions of a header, which must be long enough.
 struct Bytes<'a> {
     head: &'a [u8],
     endian: Endian,
@@ -173,13 +173,13 @@ fn wrong_offset(path: &Path, found: f64) -> ReadError {
     ReadError::header(path, "vox_offset", &found.to_string(), "the byte where samples begin, past the header")
 }
 
-/// The number if it is whole and exact.
+/// The number as an integer, if it is one and is exact.
 #[expect(clippy::cast_possible_truncation, reason = "whole numbers below 2^53 only")]
 fn whole(x: f64) -> Option<i64> {
     (x.fract() == 0.0 && x.abs() < 9e15).then_some(x as i64)
 }
 
-/// Where samples begin; a zero in a single file means right after the header and its four flag bytes.
+/// Where the samples begin; in a single file, zero means right after the header and its four flag bytes.
 fn place(offset: i64, storage: Storage, behind: u64) -> Option<u64> {
     let offset = u64::try_from(offset).ok()?;
     match storage {
@@ -189,7 +189,7 @@ fn place(offset: i64, storage: Storage, behind: u64) -> Option<u64> {
     }
 }
 
-/// Lengths of the axes, of which `dim[0]` tells the number.
+/// Lengths of the axes; `dim[0]` is their number.
 fn dims(path: &Path, dim: [i64; 8]) -> Result<[usize; 7], ReadError> {
     let found = dim.map(|n| n.to_string()).join(" ");
     let wrong = || ReadError::header(path, "dim", &found, "1 to 7 axes, each of at least 1 voxel");

@@ -1,4 +1,4 @@
-//! NIfTI-1 and NIfTI-2: a binary header, with the samples behind it (`.nii`) or in a file beside it (`.hdr`, `.img`).
+//! NIfTI-1 and NIfTI-2: a binary header, with the samples after it (`.nii`) or in a second file (`.hdr`, `.img`).
 
 mod header;
 mod orientation;
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use tyndall::message::path_name;
 use tyndall::volume::ValueMap;
 
-/// Reads a `.nii`, `.hdr` or `.img` file, or one of these compressed with gzip.
+/// Reads a `.nii`, `.hdr` or `.img` file, also compressed with gzip.
 pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
     let header_path = if has_extension(path, "img") { beside(path, "hdr")? } else { path.to_path_buf() };
     let path = header_path.as_path();
@@ -86,25 +86,25 @@ fn sample_type(path: &Path, code: i32) -> Result<(SampleType, usize), ReadError>
     Err(ReadError::unsupported(path, format!("datatype {code} ({what})"), mend))
 }
 
-/// Slope and intercept; a slope of zero or not a number means none.
+/// Slope and intercept; a slope that is zero or not finite means no scaling.
 fn scaling(path: &Path, header: &Header) -> Result<ValueMap, ReadError> {
     let Header { slope, intercept, .. } = *header;
     if !slope.is_finite() || slope == 0.0 {
         return Ok(ValueMap::IDENTITY);
     }
     if !intercept.is_finite() {
-        let expected = "a finite number, because scl_slope is one";
+        let expected = "a finite number, because scl_slope is set";
         return Err(ReadError::header(path, "scl_inter", &intercept.to_string(), expected));
     }
     Ok(ValueMap { slope, intercept })
 }
 
-/// Whether the name ends so, before `.gz` and whatever its case.
+/// Whether the name has this extension, ignoring case and a final `.gz`.
 fn has_extension(path: &Path, extension: &str) -> bool {
     split(path).1.eq_ignore_ascii_case(extension)
 }
 
-/// The name without extensions, the extension before `.gz`.
+/// The path without extensions, and the extension before any `.gz`.
 fn split(path: &Path) -> (PathBuf, String) {
     let bare = match path.extension() {
         Some(e) if e.eq_ignore_ascii_case("gz") => path.with_extension(""),
@@ -114,7 +114,8 @@ fn split(path: &Path) -> (PathBuf, String) {
     (bare.with_extension(""), extension)
 }
 
-/// The other file of a pair: the same name with another extension; compressed first if this one is.
+/// The other file of a pair: the same name with another extension. If this file is compressed, a compressed
+/// one is tried first.
 fn beside(path: &Path, extension: &str) -> Result<PathBuf, ReadError> {
     let stem = split(path).0;
     let upper = extension.to_uppercase();

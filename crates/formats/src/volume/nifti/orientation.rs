@@ -1,4 +1,4 @@
-//! Where NIfTI voxels lie: sform, else qform, else voxel sizes alone.
+//! Where NIfTI voxels are placed: by the sform, else the qform, else voxel sizes alone.
 //!
 //! NIfTI's world is RAS; ours is LPS: the first two coordinates change sign.
 
@@ -8,7 +8,7 @@ use super::header::Header;
 use std::path::Path;
 use tyndall::volume::{Grid, Space};
 
-/// Rows of a map from index to world (RAS); the last column is the place of voxel (0, 0, 0).
+/// Rows of the matrix from index to world (RAS); the last column is the position of voxel (0, 0, 0).
 type Rows = [[f64; 4]; 3];
 
 /// The sform wins over the qform, as in nibabel.
@@ -24,7 +24,7 @@ pub(super) fn grid(path: &Path, header: &Header, notes: &mut Vec<String>) -> Res
         by_quaternion(header)
     } else {
         notes.push(
-            "no sform and no qform: centred, with left and right as Analyze has them (index x runs to the left)"
+            "no sform and no qform: centred, with left and right as in Analyze (index x runs to the left)"
                 .into(),
         );
         by_size(header, dims)
@@ -35,12 +35,12 @@ pub(super) fn grid(path: &Path, header: &Header, notes: &mut Vec<String>) -> Res
     placement::grid(path, dims, std::array::from_fn(|j| Some(column(j))), column(3), Space::Anatomical)
 }
 
-/// Method 2 of the standard: a unit quaternion whose first part is implied, voxel sizes, and the
+/// Method 2 of the standard: a unit quaternion whose first component is implied, voxel sizes, and the
 /// sign of `pixdim[0]` for the third axis.
 fn by_quaternion(header: &Header) -> Rows {
     let [mut b, mut c, mut d] = header.quaternion;
     let norm2 = b * b + c * c + d * d;
-    // Rounding in the file may take b, c, d to a length of one or past it: a half turn, then.
+    // Rounding in the file may bring (b, c, d) to a length of one or more: this is a half turn.
     let a = if 1.0 - norm2 < 1e-7 {
         let norm = norm2.sqrt();
         [b, c, d] = [b / norm, c / norm, d / norm];
@@ -75,7 +75,7 @@ fn by_size(header: &Header, dims: [usize; 3]) -> Rows {
     })
 }
 
-/// Lengths; what is zero or no number counts as one.
+/// Absolute voxel sizes; one that is zero or not finite counts as 1.
 fn voxel_sizes(header: &Header) -> [f64; 3] {
     std::array::from_fn(|i| {
         let size = header.pixdim[i + 1].abs();
@@ -83,7 +83,7 @@ fn voxel_sizes(header: &Header) -> [f64; 3] {
     })
 }
 
-/// Whether any corner of the box is moved by more than a tenth of a voxel.
+/// Whether any corner of the box differs by more than a tenth of a voxel.
 fn differ(a: &Rows, b: &Rows, dims: [usize; 3]) -> bool {
     let voxel = (0..3).map(|i| a[i][0].hypot(a[i][1]).hypot(a[i][2])).fold(f64::INFINITY, f64::min);
     (0..3).any(|i| {

@@ -5,7 +5,7 @@ use flate2::{Compression, write::GzEncoder};
 use std::io::Write;
 use tyndall::volume::{Space, ValueMap, Voxels};
 
-/// Writes entries at their places, in either byte order.
+/// Writes entries at given positions, in either byte order.
 struct Writer {
     bytes: Vec<u8>,
     big: bool,
@@ -72,7 +72,7 @@ fn both_byte_orders_and_gzip_give_the_same() {
 }
 
 #[test]
-fn version_2_reads_alike() {
+fn version_2_is_read_too() {
     for big in [false, true] {
         let mut w = Writer { bytes: vec![0; 544], big };
         w.put(0, 540_i32.to_le_bytes()).i16(12, 4).put(168, 544_i64.to_le_bytes());
@@ -97,7 +97,7 @@ fn version_2_reads_alike() {
 }
 
 #[test]
-fn without_an_sform_the_quaternion_turns_and_without_both_the_box_is_centred() {
+fn without_an_sform_the_quaternion_rotates_and_without_either_the_box_is_centred() {
     // A quarter turn about z: b = c = 0, d = sin 45.
     let mut w = version_1(false, b"n+1\0");
     w.i16(252, 1).f32(264, std::f32::consts::FRAC_1_SQRT_2).f32(268, 5.0).f32(76, -1.0);
@@ -128,7 +128,7 @@ fn a_pair_is_read_from_either_file() {
 }
 
 #[test]
-fn a_slope_of_zero_scales_nothing_and_colours_give_their_red() {
+fn a_slope_of_zero_is_ignored_and_only_the_red_of_colours_is_read() {
     let mut w = version_1(false, b"n+1\0");
     w.f32(112, 0.0);
     assert_eq!(load(&w).unwrap().volume.value_map(), ValueMap::IDENTITY);

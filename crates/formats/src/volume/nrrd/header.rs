@@ -8,12 +8,12 @@ use std::path::Path;
 /// The fields, and the data files if the header lists them.
 pub(super) struct Header<'a> {
     pub fields: Fields<'a>,
-    /// Names after `data file: LIST`.
+    /// File names after `data file: LIST`.
     pub listed: Vec<String>,
 }
 
-/// Reads up to and with the blank line that ends the header; a header that names data files may end with
-/// its file. Comments and key/value pairs (`key:=value`) say nothing about the array.
+/// Reads up to and including the blank line that ends the header; a header that names data files may also
+/// end at the end of its file. Comments and key/value pairs (`key:=value`) are skipped.
 pub(super) fn read<'a>(path: &'a Path, reader: &mut dyn BufRead) -> Result<Header<'a>, ReadError> {
     let mut lines = Lines::new(path, reader);
     let magic = lines.next_line()?.unwrap_or_default();
@@ -54,7 +54,7 @@ pub(super) fn read<'a>(path: &'a Path, reader: &mut dyn BufRead) -> Result<Heade
     Ok(Header { fields, listed })
 }
 
-/// Whether the first colon of the line begins `:=`.
+/// Whether the first colon of the line is part of `:=`.
 fn is_pair(line: &str) -> bool {
     line.split_once(':').is_some_and(|(_, rest)| rest.starts_with('='))
 }

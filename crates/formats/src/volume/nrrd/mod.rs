@@ -1,4 +1,4 @@
-//! NRRD, versions 1 to 5, as Teem defines it: a text header, and samples after it or in files that it names.
+//! NRRD, versions 1 to 5, as defined by Teem: a text header, with the samples after it or in files that it names.
 
 mod header;
 mod orientation;
@@ -43,7 +43,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
     Parsed { grid, voxels, values: ValueMap::IDENTITY, channels, times, notes }.load(path)
 }
 
-/// How to come from a data file to its samples.
+/// How to get from a data file to its samples.
 struct Data {
     coding: Coding,
     skip: Skip,
@@ -67,7 +67,7 @@ impl Data {
     }
 }
 
-/// What stands before the samples of a data file.
+/// What to skip before the samples of a data file.
 struct Skip {
     lines: u64,
     bytes: Start,
@@ -94,7 +94,7 @@ impl Skip {
     }
 }
 
-/// Passes a line however long; true at the end of the file.
+/// Skips a line of any length; true if the file had already ended.
 fn skip_line(file: &mut BufReader<File>) -> std::io::Result<bool> {
     let mut read = 0;
     for byte in file.by_ref().bytes() {
@@ -126,7 +126,7 @@ fn endian(fields: &Fields, sample: SampleType, text: bool) -> Result<Endian, Rea
     if sample.size() == 1 || text {
         return Ok(Endian::NATIVE);
     }
-    let expected = "little or big, which samples of several bytes need";
+    let expected = "little or big, required for samples of several bytes";
     let name = fields.need(&["endian"], expected)?.to_lowercase();
     name.parse().map_err(|_| ReadError::header(fields.path, "endian", &name, expected))
 }

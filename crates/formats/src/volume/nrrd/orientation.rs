@@ -1,4 +1,4 @@
-//! What the axes of an NRRD array are, and where they lie in the world.
+//! What the axes of an NRRD array stand for, and how they are placed in the world.
 
 use super::super::error::ReadError;
 use super::super::fields::{Fields, finite};
@@ -9,7 +9,7 @@ use tyndall::volume::{Grid, Space};
 
 type Vector = [f64; 3];
 
-/// More axes than NRRD allows.
+/// Most axes that NRRD allows.
 const MOST_AXES: usize = 16;
 
 /// The array's axes, fastest first.
@@ -20,11 +20,11 @@ pub(super) struct Shape {
     space: World,
 }
 
-/// The world that a header speaks of.
+/// The world space that a header declares.
 #[derive(Clone, Copy)]
 struct World {
     space: Space,
-    /// Signs that bring its axes to ours.
+    /// Signs that convert its axes to ours.
     signs: Vector,
     /// Numbers per vector.
     dimension: usize,
@@ -82,7 +82,7 @@ impl Shape {
                 let mut step = [0.0; 3];
                 step[i] = spacing;
                 steps[i] = Some(step);
-                // The axis minimum is the border of the first cell, unless samples sit on nodes.
+                // The axis minimum is the outer edge of the first cell, unless samples are centred on nodes.
                 origin[i] = of(&mins).map_or(0.0, |min| if node { min } else { min + 0.5 * spacing });
             }
         }
@@ -98,7 +98,7 @@ impl Shape {
 }
 
 impl World {
-    /// A vector of the file in our world; what has fewer than three numbers lies in the plane.
+    /// Converts a vector of the file to our world; missing components are zero.
     fn bring(&self, vector: &[f64]) -> Option<Vector> {
         (vector.len() == self.dimension)
             .then(|| std::array::from_fn(|i| self.signs[i] * vector.get(i).copied().unwrap_or(0.0)))
@@ -126,7 +126,7 @@ fn world(fields: &Fields, notes: &mut Vec<String>) -> Result<World, ReadError> {
         "scanner-xyz" | "3d-right-handed" => plain(3),
         "scanner-xyz-time" | "3d-right-handed-time" => plain(4),
         "3d-left-handed" | "3d-left-handed-time" => {
-            notes.push("left-handed space: shown as it stands, so left and right are swapped".into());
+            notes.push("left-handed space: shown as is, so left and right are swapped".into());
             plain(if name.len() > "3d-left-handed".len() { 4 } else { 3 })
         }
         _ => {
@@ -139,7 +139,7 @@ fn world(fields: &Fields, notes: &mut Vec<String>) -> Result<World, ReadError> {
         && world.space == Space::Anatomical
         && units.split('"').any(|unit| !matches!(unit.trim(), "" | "mm" | "s" | "ms" | "???"))
     {
-        notes.push(format!("space units {units}: taken for millimetres, as ITK does"));
+        notes.push(format!("space units {units}: read as millimetres, as ITK does"));
     }
     Ok(world)
 }
@@ -176,14 +176,14 @@ fn vectors(text: &str) -> Option<Vec<Option<Vec<f64>>>> {
     Some(found)
 }
 
-/// A number, or `nan` for one that is not known.
+/// A number, or `nan` if it is unknown.
 fn optional(word: &str) -> Option<Option<f64>> {
     let value: f64 = word.parse().ok()?;
     if value.is_nan() { Some(None) } else { value.is_finite().then_some(Some(value)) }
 }
 
-/// What each axis is: what its kind says, else spatial if it has a step in space. Past the third
-/// spatial axis it is time.
+/// What each axis stands for, as its kind says; if the kind leaves that open, it is spatial if it has a step
+/// in space. Spatial axes after the third count as time.
 fn meanings(
     sizes: &[usize],
     kinds: Option<&[String]>,
@@ -197,7 +197,7 @@ fn meanings(
             "time" => Axis::Time,
             "domain" | "space" | "???" | "none" => match direction {
                 Some(None) => Axis::Channel,
-                // A step in time alone, in a space with time.
+                // A step in time only, in a space that includes time.
                 Some(Some(_)) if still && size > 1 => Axis::Time,
                 _ => Axis::Space,
             },

@@ -81,7 +81,7 @@ fn anatomical_spaces_come_to_lps_and_others_stay() {
 }
 
 #[test]
-fn of_channels_and_times_the_first_is_read() {
+fn the_first_channel_at_the_first_time_is_read() {
     let data: Vec<u8> = (0..24).collect();
     let rgb = "type: uchar\ndimension: 4\nsizes: 3 2 2 2\nencoding: raw\nspace: LPS\nkinds: RGB-color domain domain domain\n\
                space directions: none (1,0,0) (0,1,0) (0,0,5)";
@@ -97,7 +97,7 @@ fn of_channels_and_times_the_first_is_read() {
 }
 
 #[test]
-fn axis_ends_place_the_first_sample() {
+fn axis_mins_and_maxs_place_the_first_sample() {
     let header = "type: uchar\ndimension: 2\nsizes: 4 2\nencoding: raw\n\
                   axis mins: 10 -1\naxis maxs: 18 1\ncenterings: cell node";
     let loaded = load(header, &[0; 8]).unwrap();
