@@ -11,7 +11,7 @@ use std::time::Instant;
 use tyndall::film::Image;
 use tyndall::integrator::{KeptItems, WorkShare};
 use tyndall::message::{excerpt, path_name, sentence};
-use tyndall_live::{Budget, Input, LiveSession, Options};
+use tyndall_live::{Budget, EditSource, Input, LiveSession, Options};
 
 /// Plays EDITS against SCENE.
 pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
@@ -132,7 +132,10 @@ fn play(live: &mut LiveSession, edit: &Edit, at: &str, run: &Run) -> Result<Repo
         Before { samples: live.film().samples(), image: live.image(), kept: live.session().kept_items() }
     });
     let begun = Instant::now();
-    let notes = live.edit_at(&edit.patch, at).map_err(Failure::input)?.notes;
+    let notes = live
+        .edit_from(&edit.patch, EditSource { name: at, ..EditSource::default() })
+        .map_err(Failure::input)?
+        .notes;
     run.refine(live, 1);
     let latency_s = begun.elapsed().as_secs_f64();
     if run.interrupt.asked() {

@@ -48,5 +48,5 @@ pub use build::{Built, SceneError};
 pub use error::LiveError;
 pub use input::{Input, LoadedScene, read_text};
 pub use options::Options;
-pub use session::{EditReport, LiveSession};
+pub use session::{EditReport, EditSource, LiveSession};
 pub use tyndall::session::{Budget, Progress};

@@ -47,6 +47,22 @@ pub struct EditReport {
     pub to_scene: Duration,
 }
 
+/// Where an edit comes from.
+#[derive(Clone, Copy, Debug)]
+pub struct EditSource<'a> {
+    /// What error messages begin with.
+    pub name: &'a str,
+    /// Consecutive edits of one gesture, such as the drag of a slider, are one step of undo; `None` for an edit of its own.
+    pub gesture: Option<u64>,
+}
+
+impl Default for EditSource<'_> {
+    /// A single edit.
+    fn default() -> Self {
+        Self { name: "edit", gesture: None }
+    }
+}
+
 impl LiveSession {
     /// Opens a file: a scene, a picture that carries one, or a volume, whose look is then chosen for it.
     ///
@@ -112,14 +128,15 @@ impl LiveSession {
     /// # Errors
     /// [`LiveError`] with what is wrong with the patched document; the session then is as it was.
     pub fn edit(&mut self, patch: &Value) -> Result<EditReport, LiveError> {
-        self.edit_at(patch, "edit")
+        self.edit_from(patch, EditSource::default())
     }
 
-    /// [`Self::edit`], whose errors begin with `at`, which says where the patch comes from.
+    /// As [`Self::edit`], and says where the patch comes from.
     ///
     /// # Errors
-    /// The same.
-    pub fn edit_at(&mut self, patch: &Value, at: &str) -> Result<EditReport, LiveError> {
+    /// As [`Self::edit`].
+    pub fn edit_from(&mut self, patch: &Value, source: EditSource<'_>) -> Result<EditReport, LiveError> {
+        let EditSource { name: at, gesture } = source;
         let begun = Instant::now();
         let mut patch = patch.clone();
         let moved = document::move_old_keys(&mut patch)
@@ -127,8 +144,13 @@ impl LiveSession {
         let before = self.value().into_owned();
         let after = document::apply(&before, &patch);
         let patching = begun.elapsed();
+        let meant = self.built.document.clone();
         let mut report = self.go_to(after, at)?;
-        self.undo.remember(&before, &self.value);
+        if meant.equals_but_for_camera(&self.built.document) {
+            self.undo.rewritten(&before, &self.value);
+        } else {
+            self.undo.remember(&before, &self.value, gesture);
+        }
         report.to_scene += patching;
         report.notes.splice(0..0, moved);
         Ok(report)

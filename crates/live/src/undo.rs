@@ -1,11 +1,15 @@
-//! Undo and redo of a document's edits. The camera is apart: looking around is no edit to be undone, and undoing an edit does not
-//! move the viewer.
+//! Undo and redo of a document's edits. The camera stays out of both: moving it is not a step to undo, and undoing an edit does
+//! not move it.
 
 use crate::document::CAMERA;
 use serde_json::{Map, Value};
 
-/// Steps that are remembered.
-const MOST: usize = 1000;
+/// The most steps that are remembered.
+const MOST_STEPS: usize = 1000;
+
+/// The most memory that all steps may take, in bytes. A step that edits one point of a transfer function holds all its points
+/// twice, since merge patches replace lists whole.
+const MOST_BYTES: usize = 64 << 20;
 
 /// The edits that can be undone and those that can be redone.
 #[derive(Clone, Debug, Default)]
@@ -14,49 +18,107 @@ pub(crate) struct UndoList {
     future: Vec<Step>,
 }
 
-/// An edit of the document, both ways, as merge patches that know nothing of its schema.
+/// An edit as a pair of merge patches that know nothing of the document's schema.
 #[derive(Clone, Debug)]
 struct Step {
     back: Value,
     forth: Value,
+    /// Consecutive edits of the same gesture are one step.
+    gesture: Option<u64>,
+}
+
+impl Step {
+    /// The step between two documents.
+    fn between(before: &Value, after: &Value, gesture: Option<u64>) -> Self {
+        let back = without_camera(difference(after, before));
+        Self { back, forth: without_camera(difference(before, after)), gesture }
+    }
+
+    fn is_empty(&self) -> bool {
+        is_empty(&self.back) && is_empty(&self.forth)
+    }
+
+    fn bytes(&self) -> usize {
+        bytes(&self.back) + bytes(&self.forth)
+    }
 }
 
 impl UndoList {
-    /// Remembers an edit, after which nothing can be redone; one that moved the camera alone is none.
-    pub fn remember(&mut self, before: &Value, after: &Value) {
-        let step = Step {
-            back: without_camera(difference(after, before)),
-            forth: without_camera(difference(before, after)),
-        };
-        if is_empty(&step.back) && is_empty(&step.forth) {
+    /// Remembers an edit, after which nothing can be redone. An edit that moved only the camera is not remembered.
+    pub fn remember(&mut self, before: &Value, after: &Value, gesture: Option<u64>) {
+        let step = Step::between(before, after, gesture);
+        if step.is_empty() {
             return;
         }
+        let continued = gesture.is_some() && self.future.is_empty();
         self.future.clear();
-        if self.past.len() == MOST {
-            self.past.remove(0);
+        match self.past.pop_if(|last| continued && last.gesture == gesture) {
+            Some(begun) => {
+                let whole = Step::between(&merged(before, &begun.back), after, gesture);
+                // A drag that ends where it began is not a step.
+                self.past.extend((!whole.is_empty()).then_some(whole));
+            }
+            None => self.past.push(step),
         }
-        self.past.push(step);
+        self.forget_oldest();
     }
 
-    /// The document before the last edit that was not undone; `None` where there is none.
+    /// The document was written differently, such as with a default filled in, but means the same: the steps on either side now
+    /// start from the new text, and there is no new step.
+    pub fn rewritten(&mut self, before: &Value, after: &Value) {
+        if let Some(last) = self.past.last_mut() {
+            *last = Step::between(&merged(before, &last.back), after, last.gesture);
+        }
+        if let Some(next) = self.future.last_mut() {
+            *next = Step::between(after, &merged(before, &next.forth), next.gesture);
+        }
+    }
+
+    fn forget_oldest(&mut self) {
+        let mut bytes: usize = self.past.iter().map(Step::bytes).sum();
+        let mut steps = self.past.len();
+        let too_many = self.past.iter().take_while(|step| {
+            // The last step stays, however large.
+            let much = steps > MOST_STEPS || (bytes > MOST_BYTES && steps > 1);
+            (bytes, steps) = (bytes - step.bytes(), steps - 1);
+            much
+        });
+        let too_many = too_many.count();
+        self.past.drain(..too_many);
+    }
+
+    /// The document before the last step; `None` if there is no step to undo.
     pub fn before(&self, document: &Value) -> Option<Value> {
         self.past.last().map(|step| merged(document, &step.back))
     }
 
-    /// The document after the edit that was undone last; `None` where there is none.
+    /// The document after the step that was undone last; `None` if there is no step to redo.
     pub fn after(&self, document: &Value) -> Option<Value> {
         self.future.last().map(|step| merged(document, &step.forth))
     }
 
-    /// The document is the one [`Self::before`] the last edit now.
+    /// The last step was undone: the document is now the one that [`Self::before`] returned.
     pub fn undone(&mut self) {
         self.future.extend(self.past.pop());
     }
 
-    /// The document is the one [`Self::after`] the edit undone last now.
+    /// The step undone last was redone: the document is now the one that [`Self::after`] returned.
     pub fn redone(&mut self) {
         self.past.extend(self.future.pop());
     }
+}
+
+/// Memory of a value, about: each entry of a list or table, with its key and text.
+fn bytes(value: &Value) -> usize {
+    /// A table also holds a hash and a place in its index for each key.
+    const KEY: usize = size_of::<String>() + 2 * size_of::<usize>();
+    let inner = match value {
+        Value::String(text) => text.len(),
+        Value::Array(list) => list.iter().map(bytes).sum(),
+        Value::Object(table) => table.iter().map(|(key, value)| KEY + key.len() + bytes(value)).sum(),
+        _ => 0,
+    };
+    size_of::<Value>() + inner
 }
 
 fn is_empty(patch: &Value) -> bool {
@@ -70,14 +132,14 @@ fn without_camera(mut patch: Value) -> Value {
     patch
 }
 
-/// The merge patch (RFC 7396) that makes `to` of `from`, two tables without nulls.
+/// The merge patch (RFC 7396) that turns `from` into `to`, two tables without nulls.
 fn difference(from: &Value, to: &Value) -> Value {
     let (Value::Object(old), Value::Object(new)) = (from, to) else { return to.clone() };
     let gone = old.keys().filter(|key| !new.contains_key(*key)).map(|key| (key.clone(), Value::Null));
     let changed = new.iter().filter(|(key, value)| old.get(*key) != Some(value)).map(|(key, value)| {
         let change = match old.get(key) {
             Some(before @ Value::Object(_)) if value.is_object() => difference(before, value),
-            // A table that was not there is no patch: nothing of it stands already.
+            // A new table is written out whole, since none of it is there yet.
             _ => value.clone(),
         };
         (key.clone(), change)
@@ -127,7 +189,7 @@ mod tests {
         ];
         let mut documents = vec![document.clone()];
         for after in edits {
-            undo.remember(&document, &after);
+            undo.remember(&document, &after, None);
             if difference(&document, &after).as_object().unwrap().keys().any(|key| key != "camera") {
                 documents.push(after.clone());
             }
@@ -149,7 +211,71 @@ mod tests {
         assert_eq!(undo.after(&document), None);
         document = undo.before(&document).unwrap();
         undo.undone();
-        undo.remember(&document, &json!({ "medium": { "density": 7 }, "camera": {} }));
+        undo.remember(&document, &json!({ "medium": { "density": 7 }, "camera": {} }), None);
         assert_eq!(undo.after(&document), None, "an edit ends what can be redone");
+    }
+
+    fn densities(undo: &mut UndoList, mut density: f64, edits: &[(f64, Option<u64>)]) -> Value {
+        let of = |density: f64| json!({ "medium": { "density": density } });
+        for &(next, gesture) in edits {
+            undo.remember(&of(density), &of(next), gesture);
+            density = next;
+        }
+        of(density)
+    }
+
+    #[test]
+    fn a_gesture_is_one_step_and_one_that_ends_where_it_began_is_none() {
+        let mut undo = UndoList::default();
+        let mut document =
+            densities(&mut undo, 1.0, &[(2.0, None), (3.0, Some(7)), (4.0, Some(7)), (5.0, Some(7))]);
+        for expected in [2.0, 1.0] {
+            document = undo.before(&document).unwrap();
+            undo.undone();
+            assert_eq!(document["medium"]["density"], expected);
+        }
+        assert_eq!(undo.before(&document), None);
+        document = undo.after(&document).unwrap();
+        undo.redone();
+        document = undo.after(&document).unwrap();
+        assert_eq!(document["medium"]["density"], 5.0);
+
+        let mut undo = UndoList::default();
+        densities(&mut undo, 1.0, &[(2.0, Some(1)), (3.0, Some(2)), (4.0, Some(2)), (2.0, Some(2))]);
+        assert_eq!(undo.past.len(), 1);
+        undo.undone();
+        densities(&mut undo, 1.0, &[(6.0, Some(1))]);
+        assert_eq!((undo.past.len(), undo.future.len()), (1, 0), "an undone gesture is not continued");
+    }
+
+    #[test]
+    fn steps_lead_through_a_document_that_was_written_differently() {
+        let lobe = |g: f64| json!({ "phase": { "type": "henyey-greenstein", "g": g } });
+        let (first, short) = (lobe(0.3), json!({ "phase": { "type": "schlick" } }));
+        let (long, last) = (json!({ "phase": { "type": "schlick", "k": 0.0 } }), lobe(0.5));
+        let mut undo = UndoList::default();
+        undo.remember(&first, &short, None);
+        undo.remember(&short, &last, None);
+        undo.undone();
+        undo.rewritten(&short, &long);
+        assert_eq!(undo.after(&long), Some(last));
+        assert_eq!(undo.before(&long), Some(first));
+    }
+
+    #[test]
+    fn the_oldest_steps_are_forgotten_when_they_are_too_many_or_too_large() {
+        let mut undo = UndoList::default();
+        let many: Vec<_> = (0..MOST_STEPS + 7).map(|i| (i as f64, None)).collect();
+        densities(&mut undo, -1.0, &many);
+        assert_eq!(undo.past.len(), MOST_STEPS);
+
+        let lists = |i: usize| json!({ "points": vec![i; 200_000] });
+        let mut undo = UndoList::default();
+        for i in 0..12 {
+            undo.remember(&lists(i), &lists(i + 1), None);
+        }
+        let held: usize = undo.past.iter().map(Step::bytes).sum();
+        assert!(held <= MOST_BYTES && undo.past.len() > 1, "{held} bytes in {} steps", undo.past.len());
+        assert_eq!(undo.before(&lists(12)), Some(lists(11)));
     }
 }

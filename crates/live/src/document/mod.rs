@@ -141,6 +141,14 @@ impl Document {
         Ok(document)
     }
 
+    /// Whether two documents are equal but for their cameras.
+    pub(crate) fn equals_but_for_camera(&self, other: &Self) -> bool {
+        let Self { version, volume, transfer_function, medium, lights, camera: _, film, render, clip } = self;
+        (version, volume, medium, film) == (&other.version, &other.volume, &other.medium, &other.film)
+            && (transfer_function, lights) == (&other.transfer_function, &other.lights)
+            && (render, clip) == (&other.render, &other.clip)
+    }
+
     /// The document as a value, with every default written out; [`Self::from_value`] makes an equal document of it.
     ///
     /// # Panics

@@ -8,7 +8,7 @@ use tyndall::film::Image;
 use tyndall::integrator::METHODS;
 use tyndall::math::cast;
 use tyndall::simd::Level;
-use tyndall_live::{Budget, Input, LiveSession, Options};
+use tyndall_live::{Budget, EditSource, Input, LiveSession, Options};
 use tyndall_testing::SplitMix;
 
 fn options() -> Options {
@@ -68,15 +68,9 @@ fn after_edits_undos_and_redos_the_picture_is_the_one_from_nothing() {
                     }
                     _ => {
                         let patch = patch(&mut random, &live.value());
-                        let is_edit = {
-                            let mut with = live.value().into_owned();
-                            let camera = with.as_object_mut().and_then(|d| d.remove("camera"));
-                            let mut after = tyndall_live::document::apply(&live.value(), &patch);
-                            let _ = (camera, after.as_object_mut().and_then(|d| d.remove("camera")));
-                            with != after
-                        };
                         live.edit(&patch).expect("an edit");
-                        if is_edit {
+                        // What only moved the camera, or repeats what holds already, is not a step.
+                        if without_camera(&live) != before {
                             past.push(before);
                             future.clear();
                         }
@@ -92,6 +86,25 @@ fn after_edits_undos_and_redos_the_picture_is_the_one_from_nothing() {
         }
         assert!(undone > 8 && redone > 3, "{undone} undos, {redone} redos");
     }
+}
+
+#[test]
+fn a_drag_is_one_step_and_what_changes_nothing_is_none() {
+    let mut live = opened(&base("path"));
+    let density = |live: &LiveSession| live.document().medium.density;
+    live.edit(&json!({ "medium": { "density": 2.0 } })).expect("an edit");
+    for step in 0..5 {
+        let patch = json!({ "medium": { "density": 3.0 + f64::from(step) } });
+        live.edit_from(&patch, EditSource { gesture: Some(1), ..EditSource::default() }).expect("an edit");
+        // Written out, but the default that holds already.
+        live.edit(&json!({ "medium": { "majorant_cell": 8 }, "camera": { "fov": 20 } })).expect("an edit");
+    }
+    assert_eq!(density(&live), 7.0);
+    for expected in [2.0, 1.0] {
+        live.undo().expect("an undo").expect("a step");
+        assert_eq!(density(&live), expected);
+    }
+    assert!(live.undo().expect("no error").is_none());
 }
 
 #[test]
