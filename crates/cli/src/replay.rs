@@ -1,4 +1,4 @@
-//! `tyndall replay`: edits against a live session, each timed and, with `--verify`, compared with a render from nothing.
+//! `tyndall replay`: edits against a live session, each timed, and with `--verify` compared with a render from nothing.
 
 use crate::args::ReplayOptions;
 use crate::edits::{self, Edit};
@@ -234,8 +234,8 @@ impl Report {
         if let Some(check) = self.check.as_ref().filter(|check| check.fails()) {
             drop(writeln!(
                 std::io::stderr(),
-                "tyndall: warning: edit `{}`: the picture differs from the one from nothing by up to {:.2e}, and {} kept parts of it \
-                 are wrong",
+                "tyndall: warning: edit `{}`: the picture differs from the one from nothing by up to {:.2e}, \
+                 and {} kept parts of it are wrong",
                 excerpt(name),
                 check.max_abs_diff,
                 check.false_negatives
