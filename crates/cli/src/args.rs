@@ -7,21 +7,21 @@ use std::time::Duration;
 use tyndall::integrator::METHODS;
 use tyndall::transfer::PRESETS;
 
-/// The scene document's own limits, so that a number past them is told as the option's fault.
+/// The scene document's own limits, so that a number beyond them is reported as the option's fault.
 const MOST_SAMPLES: i64 = 1 << 31;
 const MOST_SCATTER: i64 = 1_000_000;
 
-/// Past so many threads starting them takes longer than most pictures.
+/// Starting more threads than this takes longer than most pictures.
 const MOST_THREADS: i64 = 1024;
 
-/// Shows volumes (CT, MRI, microscopy, simulations) as light would really cross them.
+/// Renders volumes (CT, MRI, microscopy, simulations) with physically based light transport.
 #[derive(Debug, Parser)]
 #[command(
     name = "tyndall",
     version,
     about,
     long_about = "\
-Shows volumes (CT, MRI, microscopy, simulations) as light would really cross them.
+Renders volumes (CT, MRI, microscopy, simulations) with physically based light transport.
 
 A first picture:        tyndall render head.nrrd
 With another look:      tyndall render head.nrrd --preset ct-bone --size 800x800 -o head.png
@@ -43,7 +43,7 @@ pub enum Command {
     /// Play a list of edits against a live session: how fast each is, and how much was computed again
     #[command(allow_negative_numbers = true)]
     Replay(Box<ReplayOptions>),
-    /// Tell what the loader understands of a volume or of a scene's volume
+    /// Show what the loader understood of a volume or of a scene's volume
     Info(InfoOptions),
     /// Measure this machine: speed as ratios, latency, growth
     Bench(BenchOptions),
@@ -64,26 +64,27 @@ pub struct RenderOptions {
     /// A scene (.toml, .json), a picture that Tyndall made, or a volume: NRRD, NIfTI, MetaImage, NumPy
     ///
     /// A bare volume gets a preset fit to its kind, a density of 200 / box diagonal, and an automatic camera and
-    /// lights. A picture is made again from the scene in its metadata.
+    /// lights. A picture is rendered again from the scene in its metadata.
     pub input: PathBuf,
 
-    /// Write the picture to FILE: .png .jpg .tif (tone-mapped, 8 bit) or .exr (linear float); repeats
+    /// Write the picture to FILE: .png .jpg .tif (tone-mapped, 8 bit) or .exr (linear float); repeatable
     ///
-    /// `-` writes a PNG to standard output. Without this option the picture goes to the input's name with .png, here.
+    /// `-` writes a PNG to standard output. Without this option the picture goes to the current folder, as the
+    /// input's name with .png.
     #[arg(short, long = "output", value_name = "FILE")]
     pub outputs: Vec<PathBuf>,
 
     /// Stop after N samples per pixel [default: the scene's, if no other stop is given]
-    #[arg(long, value_name = "N", help_heading = "When to stop (the first met wins)",
+    #[arg(long, value_name = "N", help_heading = "When to stop (whichever comes first)",
           value_parser = value_parser!(u32).range(1..=MOST_SAMPLES))]
     pub samples: Option<u32>,
 
     /// Stop after SECONDS of rendering, not counting loading
-    #[arg(long, value_name = "SECONDS", help_heading = "When to stop (the first met wins)", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", help_heading = "When to stop (whichever comes first)", value_parser = seconds)]
     pub time: Option<Duration>,
 
     /// Stop when the picture's relative error (noise) is at most E, e.g. 0.02
-    #[arg(long, value_name = "E", help_heading = "When to stop (the first met wins)", value_parser = positive)]
+    #[arg(long, value_name = "E", help_heading = "When to stop (whichever comes first)", value_parser = positive)]
     pub target_error: Option<f64>,
 
     /// What is rendered.
@@ -94,7 +95,7 @@ pub struct RenderOptions {
     #[command(flatten)]
     pub run: RunOptions,
 
-    /// Show progress even when standard error is no terminal
+    /// Show progress even when standard error is not a terminal
     #[arg(long)]
     pub progress: bool,
 
@@ -117,7 +118,7 @@ pub struct ReplayOptions {
     #[arg(long)]
     pub verify: bool,
 
-    /// Write the picture after the last edit to FILE, as `render` does; repeats
+    /// Write the picture after the last edit to FILE, as `render` does; repeatable
     #[arg(short, long = "output", value_name = "FILE")]
     pub outputs: Vec<PathBuf>,
 
@@ -159,14 +160,14 @@ pub struct SceneOptions {
           value_parser = PossibleValuesParser::new(PRESETS.map(|preset| preset.name)))]
     pub preset: Option<String>,
 
-    /// Override any key of the scene, e.g. medium.density=0.3 or lights.0.radiance=[1,2,3]; repeats
+    /// Override any key of the scene, e.g. medium.density=0.3 or lights.0.radiance=[1,2,3]; repeatable
     ///
-    /// VALUE is JSON, else a string. The other options win over it.
+    /// VALUE is parsed as JSON, else taken as a string. The other options take precedence.
     #[arg(long, value_name = "PATH=VALUE", help_heading = "Scene")]
     pub set: Vec<String>,
 }
 
-/// Options that change no picture.
+/// Options that do not change the picture.
 #[derive(Debug, Group)]
 pub struct RunOptions {
     /// Threads [default: one per processor]
@@ -216,11 +217,11 @@ pub struct BenchOptions {
 /// Sets of tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum BenchName {
-    /// What the path tracer and the ray marcher stand on
+    /// What the path tracer and the ray marcher are built on
     Core,
-    /// Photon mapping that survives edits, beside the tables of its paper
+    /// Photon maps kept through edits, compared with the tables of the paper
     Historygrams,
-    /// All there are
+    /// All of them
     All,
 }
 
@@ -243,7 +244,7 @@ fn positive(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number above 0".into())
 }
 
-/// More seconds than the clock can count are for ever.
+/// More seconds than the clock can count mean no limit.
 fn seconds(text: &str) -> Result<Duration, String> {
     positive(text).map(|x| Duration::try_from_secs_f64(x).unwrap_or(Duration::MAX))
 }

@@ -9,7 +9,7 @@ use tyndall_live::read_text;
 
 /// One edit.
 pub struct Edit {
-    /// For reports; `edit 3` where the file gives none.
+    /// Its name in reports; `edit 3` where the file gives none.
     pub name: String,
     /// Which one it is, for messages: by number, and by name if it has one.
     pub at: String,
@@ -17,7 +17,7 @@ pub struct Edit {
     pub patch: Value,
 }
 
-/// The edits of a file, not yet looked at one by one, so that those before a bad one are still played.
+/// The edits of a file, not yet checked one by one, so that those before a bad one are still played.
 pub fn read(path: &Path) -> Result<Vec<Value>, Failure> {
     let what = "a list of edits";
     let value =
@@ -50,13 +50,11 @@ impl Edit {
         let (name, at) = match table.get("name") {
             None => (at.clone(), at),
             Some(Value::String(name)) => (name.clone(), format!("{at} (`{}`)", excerpt(name))),
-            Some(other) => return Err(format!("{at}: `name`: found {}, expected a text", kind(other))),
+            Some(other) => return Err(format!("{at}: `name`: found {}, expected a string", kind(other))),
         };
         match table.get("patch") {
             Some(patch @ Value::Object(_)) => Ok(Self { name, at, patch: patch.clone() }),
-            Some(other) => {
-                Err(format!("{at}: `patch`: found {}, expected a table of what changes", kind(other)))
-            }
+            Some(other) => Err(format!("{at}: `patch`: found {}, expected a table of changes", kind(other))),
             None => Err(format!("{at}: no `patch`, {expected}")),
         }
     }
@@ -66,9 +64,9 @@ impl Edit {
 fn kind(value: &Value) -> &'static str {
     match value {
         Value::Null => "null",
-        Value::Bool(_) => "a truth value",
+        Value::Bool(_) => "a boolean",
         Value::Number(_) => "a number",
-        Value::String(_) => "a text",
+        Value::String(_) => "a string",
         Value::Array(_) => "a list",
         Value::Object(_) => "a table",
     }

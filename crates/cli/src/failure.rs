@@ -1,16 +1,16 @@
-//! How the program ends when it does not end well.
+//! Failures and their exit statuses.
 
 use std::fmt::Display;
 use std::process::ExitCode;
 
-/// Why a command stopped; one message that names the input, what was found, what was expected and the mend.
+/// Why a command stopped; one message that names the input, what was found, what was expected and how to fix it.
 #[derive(Debug)]
 pub enum Failure {
-    /// The input is at fault, or what it asks for cannot be had.
+    /// The input is at fault, or what it requests is not possible.
     Input(String),
     /// The command line is at fault.
     Usage(String),
-    /// The user stopped it; what was there has been written.
+    /// The user interrupted it; what had been rendered has been written.
     Interrupted,
 }
 
@@ -25,7 +25,7 @@ impl Failure {
         Self::Usage(message.to_string())
     }
 
-    /// The same, said of a part of the input.
+    /// The same, with the part of the input that it concerns named first.
     pub fn within(self, part: &str) -> Self {
         match self {
             Self::Input(message) => Self::Input(format!("{part}: {message}")),

@@ -16,7 +16,7 @@ use tyndall_live::{Input, LoadedScene, Options, Source};
 /// Bins of the histogram.
 const BINS: usize = 256;
 
-/// Prints what is known of a volume.
+/// Prints what is known about a volume.
 pub fn run(options: &InfoOptions) -> Result<(), Failure> {
     let on = Options { threads: pool(None)?, level: vector_instructions()?, edits: false };
     let loaded = Input::open(&options.file).and_then(|input| input.load(&on)).map_err(Failure::input)?;

@@ -4,7 +4,7 @@ use crate::{Failure, say};
 use tyndall::transfer::{PRESETS, Preset};
 use tyndall_live::document;
 
-/// One preset a line.
+/// One preset per line.
 pub fn presets() -> Result<(), Failure> {
     let line = |preset: &Preset| format!("{:<14} {}\n", preset.name, preset.about);
     say(&PRESETS.iter().map(line).collect::<String>())

@@ -1,4 +1,4 @@
-//! What the machine gives a run: threads, vector instructions, memory, and the user's Ctrl-C.
+//! What a run takes from the machine: threads, vector instructions, and the user's Ctrl-C.
 
 use crate::Failure;
 use std::sync::Arc;
@@ -10,12 +10,12 @@ pub fn vector_instructions() -> Result<Level, Failure> {
     match std::env::var_os("TYNDALL_SIMD") {
         None => Ok(Level::best()),
         Some(name) => name.to_string_lossy().parse().map_err(|e| {
-            Failure::usage(format!("TYNDALL_SIMD: {e}; name one of these, or unset it for the best"))
+            Failure::usage(format!("TYNDALL_SIMD: {e}; name one of these, or unset it to use the best"))
         }),
     }
 }
 
-/// Threads of the program's own.
+/// The program's own threads.
 pub fn pool(threads: Option<u16>) -> Result<Arc<rayon::ThreadPool>, Failure> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads.map_or(0, usize::from))
@@ -24,8 +24,8 @@ pub fn pool(threads: Option<u16>) -> Result<Arc<rayon::ThreadPool>, Failure> {
         .map_err(|e| Failure::usage(format!("--threads: {e}")))
 }
 
-/// Ctrl-C: ends the program at once while there is no picture to save, then asks for an early end, and
-/// the second time ends at once again.
+/// Ctrl-C: while there is no picture to save it ends the program at once; later the first requests an early end, and
+/// the second ends at once.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
     asks: Arc<AtomicBool>,
@@ -33,11 +33,11 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// From now on.
+    /// Installs the handler.
     pub fn listen() -> Self {
         let interrupt = Self::default();
         let heard = interrupt.clone();
-        // Without a handler Ctrl-C still ends the program, only without a picture.
+        // Without a handler Ctrl-C still ends the program, but saves no picture.
         drop(ctrlc::set_handler(move || {
             if !heard.asks.load(Ordering::Relaxed) || heard.asked.swap(true, Ordering::Relaxed) {
                 let _nothing_half_written = tyndall_formats::atomic::abandon();
@@ -47,17 +47,17 @@ impl Interrupt {
         interrupt
     }
 
-    /// There is something to save now.
+    /// From now on there is a picture to save: the first Ctrl-C only requests an end.
     pub fn ask_from_now_on(&self) {
         self.asks.store(true, Ordering::Relaxed);
     }
 
-    /// Whether to end.
+    /// Whether an end was requested.
     pub fn asked(&self) -> bool {
         self.asked.load(Ordering::Relaxed)
     }
 
-    /// The flag itself, for sessions to look at.
+    /// The flag itself, for sessions to poll.
     pub fn flag(&self) -> Arc<AtomicBool> {
         self.asked.clone()
     }

@@ -43,7 +43,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             if let Some(message) = failure.message() {
-                // With stderr closed there is nowhere left to say it.
+                // If stderr is closed the message is lost.
                 drop(writeln!(std::io::stderr(), "tyndall: {message}"));
             }
             failure.exit_code()
@@ -51,14 +51,14 @@ fn main() -> ExitCode {
     }
 }
 
-/// Ends the program as clap would, only that words of the command line are shown as in all messages: short, and
-/// without what would move the cursor.
+/// Ends the program as clap would, except that arguments are quoted as in all messages: short, and without control
+/// characters.
 fn refuse(error: &clap::Error) -> ! {
     let mut words = std::env::args_os();
     let program = words.next();
     let shown = words.map(|word| excerpt(&word.to_string_lossy()).into());
     let shown = program.into_iter().chain(shown);
-    // The same fault, in words that can be shown.
+    // The same error, with arguments that are safe to print.
     Args::try_parse_from(shown).err().as_ref().unwrap_or(error).exit()
 }
 
@@ -68,11 +68,11 @@ fn say(text: &str) -> Result<(), Failure> {
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|e| stdout_failure(&e))
 }
 
-/// Why stdout took no more.
+/// The failure of a write to stdout.
 fn stdout_failure(error: &std::io::Error) -> Failure {
     let mend = match error.kind() {
-        ErrorKind::BrokenPipe => "what reads it must stay open to the end",
-        _ => "send it elsewhere",
+        ErrorKind::BrokenPipe => "its reader must stay open to the end",
+        _ => "redirect it elsewhere",
     };
     Failure::input(format!("standard output: {error}; {mend}"))
 }

@@ -1,4 +1,4 @@
-//! Pictures and statistics to where they were asked for.
+//! Writes pictures and statistics to their destinations.
 
 use crate::{Failure, say, stdout_failure};
 use std::collections::BTreeSet;
@@ -12,7 +12,7 @@ use tyndall_live::document::{Background, Document, Light, Tone};
 /// The name of standard output.
 const STDOUT: &str = "-";
 
-/// Where pictures go: as asked, or the input's stem with .png in this folder.
+/// Where pictures go: the paths given, or the input's stem with .png in the current folder.
 pub fn places(asked: &[PathBuf], input: &Path) -> Vec<PathBuf> {
     if !asked.is_empty() {
         return asked.to_vec();
@@ -24,14 +24,14 @@ pub fn places(asked: &[PathBuf], input: &Path) -> Vec<PathBuf> {
     vec![PathBuf::from(format!("{stem}.png"))]
 }
 
-/// Refuses, before any work, places where nothing can be written and places that are named twice.
+/// Refuses, before any work, paths that cannot be written and paths that are named twice.
 pub fn check(pictures: &[PathBuf], statistics: Option<&Path>) -> Result<(), Failure> {
     let mut taken = BTreeSet::new();
     for place in pictures.iter().map(PathBuf::as_path).chain(statistics) {
         if !taken.insert(absolute(place)) {
             let place = tyndall::message::path_name(place);
             return Err(Failure::usage(format!(
-                "`{place}` is to be written twice; expected a place of its own for each output"
+                "`{place}` would be written twice; expected a different path for each output"
             )));
         }
     }
@@ -45,7 +45,7 @@ pub fn check(pictures: &[PathBuf], statistics: Option<&Path>) -> Result<(), Fail
     }
 }
 
-/// Writes the film to every place.
+/// Writes the film to every path.
 pub fn pictures(
     places: &[PathBuf],
     film: &Film,
@@ -83,7 +83,7 @@ pub fn pictures(
     Ok(())
 }
 
-/// The scene with its paths seen from the picture's folder, so that both can move together.
+/// The scene with its paths relative to the picture's folder, so that both can move together.
 fn metadata(film: &Film, document: &Document, from: &Path, to: &Path) -> Metadata {
     let mut document = document.clone();
     document.render.samples = film.samples().max(1);
@@ -102,14 +102,14 @@ fn metadata(film: &Film, document: &Document, from: &Path, to: &Path) -> Metadat
     metadata
 }
 
-/// A path that starts from one folder, written to start from another; an absolute one stays, and one to which no way
-/// leads becomes so.
+/// Rewrites a path relative to one folder as relative to another. An absolute path stays; one that has no relative form
+/// becomes absolute.
 fn relocate(path: &str, from: &Path, to: &Path) -> String {
     if Path::new(path).is_absolute() {
         return path.to_owned();
     }
     let target = from.join(path);
-    // The file itself may be a link, whose own name is the one to keep.
+    // If the file itself is a link, the link's own name is kept.
     let target = match (target.parent(), target.file_name()) {
         (Some(folder), Some(name)) => real(folder).join(name),
         _ => real(&target),
@@ -118,7 +118,7 @@ fn relocate(path: &str, from: &Path, to: &Path) -> String {
     way.to_string_lossy().replace('\\', "/")
 }
 
-/// The absolute path of a folder. Without links, where it is there: `..` behind a link leads elsewhere than it seems.
+/// The absolute path of a folder, with links resolved if it exists: `..` after a link leads elsewhere than it seems.
 fn real(folder: &Path) -> PathBuf {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
     folder.canonicalize().unwrap_or_else(|_| absolute(folder))
@@ -140,9 +140,7 @@ pub fn statistics(place: &Path, value: &serde_json::Value) -> Result<(), Failure
 
 fn unwritable(place: &Path, error: &std::io::Error) -> String {
     let place = tyndall::message::path_name(place);
-    format!(
-        "{place}: statistics cannot be written: {error}; name a file in a folder that takes files, or `-`"
-    )
+    format!("{place}: statistics cannot be written: {error}; name a file in a writable folder, or `-`")
 }
 
 #[cfg(test)]
@@ -150,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_default_place_is_the_stem_here() {
+    fn the_default_path_is_the_stem_in_the_current_folder() {
         let place = |input: &str| places(&[], Path::new(input))[0].to_string_lossy().into_owned();
         assert_eq!(place("a/head.nrrd"), "head.png");
         assert_eq!(place("a/b.c/head.nii.gz"), "head.png");
@@ -158,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn paths_follow_the_picture() {
+    fn paths_become_relative_to_the_picture() {
         let root = tempfile::tempdir().unwrap();
         for folder in ["data/a", "data/x", "out/deep"] {
             std::fs::create_dir_all(root.path().join(folder)).unwrap();

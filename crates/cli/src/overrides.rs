@@ -6,7 +6,7 @@ use serde_json::json;
 use tyndall::message::excerpt;
 use tyndall_live::Input;
 
-/// Lays the options over the document: `--set` in their order, then the others.
+/// Applies the options to the document: `--set` in the given order, then the others.
 pub fn lay_over(input: &mut Input, options: &SceneOptions, samples: Option<u32>) -> Result<(), Failure> {
     for assignment in &options.set {
         input.set(assignment).map_err(|e| Failure::usage(format!("--set {}: {e}", excerpt(assignment))))?;

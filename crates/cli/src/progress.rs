@@ -29,7 +29,7 @@ impl Display {
         if std::io::stderr().is_terminal() {
             let style = ProgressStyle::with_template("{bar:32} {percent:>3} %  {msg}");
             let bar = ProgressBar::new(1000);
-            // The template is fixed; were it ever refused, the default style would do.
+            // The template is fixed; if it were ever refused, the default style would do.
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             return Self::Bar(bar);
         }
@@ -50,14 +50,14 @@ impl Display {
             Self::Lines { last } => {
                 if last.elapsed() >= LINES_EVERY {
                     *last = Instant::now();
-                    // Progress is a courtesy: where stderr is closed it is dropped.
+                    // Progress is optional: if stderr is closed it is dropped.
                     drop(writeln!(std::io::stderr(), "{:3.0} %  {text}", 100.0 * share));
                 }
             }
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn finish(&self) {
         if let Self::Bar(bar) = self {
             bar.finish_and_clear();

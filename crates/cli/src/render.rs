@@ -13,10 +13,10 @@ use std::time::{Duration, Instant};
 use tyndall::message::sentence;
 use tyndall_live::{Budget, Input, LiveSession, Options};
 
-/// How often progress is looked at.
+/// How often progress is checked.
 const SLICE: Duration = Duration::from_millis(100);
 
-/// The error of the picture is looked at this often, and costs a walk over all pixels.
+/// How often the picture's error is computed, which takes a pass over all pixels.
 const ERROR_EVERY: Duration = Duration::from_millis(500);
 
 /// When to stop.
@@ -24,7 +24,7 @@ struct StopConditions {
     samples: u32,
     time: Option<Duration>,
     error: Option<f64>,
-    /// Samples that will do for a picture whose error cannot be told: of a method without noise, or all black.
+    /// Samples at which to stop if the picture has no error estimate: the method has no noise, or all is black.
     usual_samples: u32,
 }
 
@@ -32,7 +32,7 @@ struct StopConditions {
 pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let note = |text: &str| {
         if options.verbose {
-            // A courtesy, like progress.
+            // Optional, like progress.
             drop(writeln!(std::io::stderr(), "tyndall: {text}"));
         }
     };
@@ -67,7 +67,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         samples: if limited && options.samples.is_none() { u32::MAX } else { samples },
         time: options.time,
         error: options.target_error,
-        // An error takes two samples to be told.
+        // An error estimate needs two samples.
         usual_samples: samples.max(2),
     };
     interrupt.ask_from_now_on();
@@ -87,7 +87,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         let asked = time.as_secs_f64();
         drop(writeln!(
             std::io::stderr(),
-            "tyndall: note: {why} took {rendered:.1} s of the {asked} s asked for"
+            "tyndall: note: {why} took {rendered:.1} s, more than the {asked} s of --time"
         ));
     }
     note(&format!("{:.2} samples per pixel in {rendered:.2} s", live.film().mean_samples()));
@@ -115,10 +115,10 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     if interrupted { Err(Failure::Interrupted) } else { Ok(()) }
 }
 
-/// Refines slice by slice until a stop is met, showing how far it is.
+/// Refines in slices of time until a stop condition is met, showing progress.
 fn refine(live: &mut LiveSession, stop: &StopConditions, cancel: &Arc<AtomicBool>, mut display: Display) {
     let begun = Instant::now();
-    // A time that the clock cannot count to never comes.
+    // A deadline that the clock cannot represent is no limit.
     let end = stop.time.and_then(|time| begun.checked_add(time));
     let mut looked = begun;
     let mut error = None;
@@ -127,7 +127,7 @@ fn refine(live: &mut LiveSession, stop: &StopConditions, cancel: &Arc<AtomicBool
         // The first sample of every pixel is always taken: no picture has holes.
         let complete = live.film().samples() > 0;
         let deadline = if complete { end.map_or(slice, |end| end.min(slice)) } else { slice };
-        // Whether the picture has an error at all shows by then.
+        // By the usual samples it is known whether the picture has an error estimate at all.
         let untold = stop.error.is_some() && error.is_none();
         let samples = if untold { stop.samples.min(stop.usual_samples) } else { stop.samples };
         let budget = Budget { samples, deadline: Some(deadline), cancel: cancel.clone() };

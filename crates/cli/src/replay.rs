@@ -1,4 +1,4 @@
-//! `tyndall replay`: edits against a live session, each timed, and on demand held against a render from nothing.
+//! `tyndall replay`: edits against a live session, each timed, and with `--verify` compared with a render from nothing.
 
 use crate::args::ReplayOptions;
 use crate::edits::{self, Edit};
@@ -79,7 +79,7 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
         });
         output::statistics(place, &statistics)?;
     }
-    // Also before a bad edit: nothing is lost.
+    // Also when an edit was bad: the picture before it is not lost.
     if !options.outputs.is_empty() && live.film().samples() > 0 {
         let samples = live.document().render.samples;
         run.refine(&mut live, samples);
@@ -89,7 +89,7 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
     if interrupt.asked() { Err(Failure::Interrupted) } else { Ok(()) }
 }
 
-/// What one edit cost, and what it came to.
+/// What one edit cost, and its result.
 struct Report {
     /// Method and size of the picture.
     integrator: &'static str,
@@ -97,24 +97,24 @@ struct Report {
     latency_s: f64,
     recomputed: Vec<WorkShare>,
     check: Option<Check>,
-    /// What a user should know that was not so before.
+    /// What a user should know that did not hold before the edit.
     notes: Vec<String>,
 }
 
-/// What there was before an edit.
+/// The state before an edit.
 struct Before {
     samples: u32,
     image: Image,
     kept: Option<Box<dyn KeptItems>>,
 }
 
-/// A live picture held against one from nothing.
+/// A live picture compared with one from nothing.
 struct Check {
     scratch_s: f64,
     max_abs_diff: f64,
     /// Pixels, light paths and segments, or samples, that were kept and are wrong.
     false_negatives: usize,
-    /// Those that were computed again for nothing; `None` where before and after cannot be compared.
+    /// Those that were recomputed with the same result; `None` where before and after cannot be compared.
     false_positives: Option<usize>,
 }
 
@@ -159,7 +159,7 @@ fn check(
     run.refine(&mut fresh, 1);
     let scratch_s = begun.elapsed().as_secs_f64();
 
-    // Pictures are equal at equal numbers of samples, of which a kept one may have more than were asked for.
+    // Pictures are equal only at equal sample counts, and a kept picture may have more samples than requested.
     let samples = live.document().render.samples.max(live.film().samples());
     run.refine(live, samples);
     run.refine(&mut fresh, samples);
@@ -206,7 +206,7 @@ fn farthest(a: &Image, b: &Image) -> f64 {
     pairs.map(|(a, b)| f64::from((a - b).abs())).fold(0.0, f64::max)
 }
 
-/// What the columns of [`Report::line`] are.
+/// The headings of the columns of [`Report::line`].
 fn heading(verify: bool) -> String {
     let checked = if verify { "  from nothing  speed-up  largest difference  false -  false +" } else { "" };
     format!("{:<32} {:>10}  recomputed{checked}\n", "edit", "latency")
@@ -232,13 +232,13 @@ impl Report {
         line + "\n"
     }
 
-    /// Says so where the picture is not the one from nothing.
+    /// Warns if the picture is not the one from nothing.
     fn warn(&self, name: &str) {
         if let Some(check) = self.check.as_ref().filter(|check| check.fails()) {
             drop(writeln!(
                 std::io::stderr(),
-                "tyndall: warning: edit `{}`: the picture differs from the one from nothing by up to {:.2e}, and {} parts of it were \
-                 kept and are wrong",
+                "tyndall: warning: edit `{}`: the picture differs from the one from nothing by up to {:.2e}, \
+                 and {} kept parts of it are wrong",
                 excerpt(name),
                 check.max_abs_diff,
                 check.false_negatives

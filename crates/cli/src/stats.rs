@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 use std::time::Instant;
 
-/// Named stretches of time, in the order in which they happened.
+/// Named stages and their seconds, in the order in which they happened.
 #[derive(Debug)]
 pub struct Stages {
     stages: Vec<(&'static str, f64)>,
@@ -11,12 +11,12 @@ pub struct Stages {
 }
 
 impl Stages {
-    /// Begins to count at `start`.
+    /// The first stage begins at `start`.
     pub fn new(start: Instant) -> Self {
         Self { stages: Vec::new(), since: start }
     }
 
-    /// Ends the stage that began with the one before.
+    /// Ends the stage that began when the previous one ended; returns its seconds.
     pub fn end(&mut self, name: &'static str) -> f64 {
         let seconds = self.since.elapsed().as_secs_f64();
         self.since = Instant::now();
@@ -30,7 +30,7 @@ impl Stages {
     }
 }
 
-/// The largest resident memory of this process so far; `None` where the system does not tell.
+/// The largest resident memory of this process so far; `None` where the system does not report it.
 pub fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

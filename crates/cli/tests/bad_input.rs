@@ -1,5 +1,5 @@
 //! Bad input ends with the right exit status and one message that names the fault: 1 where the input is at fault, 2
-//! where the command line is. Nothing panics, nothing hangs, nothing is left behind, and a gibibyte is enough for all.
+//! where the command line is. Nothing panics, nothing hangs, nothing is left behind, and no run takes a gibibyte.
 
 mod fault;
 mod support;
@@ -185,7 +185,7 @@ fn a_volume_that_cannot_be_had_is_named() {
 }
 
 #[test]
-fn a_file_that_is_no_scene_is_named_with_the_place() {
+fn a_malformed_scene_is_named_with_the_place() {
     file("../a.toml", "medium = {\n", &["a.toml", "line"]);
     file("../a.toml", "medium.density = 1\nmedium.density = 2\n", &["a.toml", "line 2"]);
     file("../a.toml", (0..=255).collect::<Vec<u8>>(), &["a.toml", "byte 128", "UTF-8"]);
@@ -226,7 +226,7 @@ fn a_picture_without_a_scene_is_named() {
     file("../a.png", b"\x89PNG\r\n\x1a\n\0\0", &["a.png", "PNG"]);
     file("../a.jpg", b"\xff\xd8\xff\xd9\0\0\0\0", &["a.jpg", "scene"]);
     file("../a.tif", b"II\x2a\0\xff\xff\xff\xff", &["a.tif", "TIFF"]);
-    // A library printed to standard error at this length, and took the memory for it.
+    // For this length a library printed to standard error, and allocated the memory.
     let text = b"II\x2a\0\x08\0\0\0\x01\0\x0e\x01\x02\0\xff\xff\xff\x7f\x08\0\0\0";
     file("../a.tif", text, &["a.tif", "a description of 2147483647 bytes"]);
     file("../a.exr", b"\x76\x2f\x31\x01\x02\0\0\0", &["a.exr", "OpenEXR"]);
@@ -295,7 +295,7 @@ fn a_value_set_to_something_invalid_is_the_inputs_fault() {
 }
 
 #[test]
-fn a_place_that_takes_no_file_is_refused_before_the_work() {
+fn an_unwritable_output_is_refused_before_the_work() {
     for (place, says) in [
         ("no/such/a.png", "create the folder"),
         ("a.bmp", ".png"),
@@ -308,7 +308,7 @@ fn a_place_that_takes_no_file_is_refused_before_the_work() {
         let arguments = vec!["render", "../scene.toml", "-o", "good.png", "-o", place];
         Fault { files, arguments, status: 2, says: vec![place, says] }.check();
     }
-    // Longer than any file system takes, and told before the work as well.
+    // Longer than any file system allows; also refused before the work.
     let name: &str = Box::leak(format!("{}.png", "a".repeat(300)).into_boxed_str());
     options(&["-o", name], 2, &["aaa...aaa", "aaa.png", "shorter"]);
     for place in ["no/such/a.json", "..", "../scene.toml/a.json"] {
@@ -320,7 +320,7 @@ fn a_place_that_takes_no_file_is_refused_before_the_work() {
 }
 
 #[test]
-fn what_the_command_line_says_is_quoted_short_and_without_its_controls() {
+fn arguments_are_quoted_short_and_without_control_characters() {
     options(&["--size", "\u{1b}[2J\n4x"], 2, &["--size", "\\u{1b}[2J\\n4x"]);
     options(&["--size=\u{1b}[2J"], 2, &["--size", "\\u{1b}[2J"]);
     options(&["--set", "\u{1b}[2J"], 2, &["--set", "\\u{1b}[2J"]);
@@ -336,7 +336,7 @@ fn what_the_command_line_says_is_quoted_short_and_without_its_controls() {
 }
 
 #[test]
-fn info_tells_of_faults_as_render_does() {
+fn info_reports_faults_as_render_does() {
     let files = vec![("scene.toml", format!("{SCENE}medium.densty = 1\n").into_bytes())];
     let arguments = vec!["info", "../scene.toml", "--json"];
     Fault { files, arguments, status: 1, says: vec!["scene.toml", "medium.densty", "`density`"] }.check();

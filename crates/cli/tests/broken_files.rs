@@ -1,5 +1,5 @@
-//! Volumes and maps that are broken, in every format: one message that names the file and the fault, promptly and
-//! without the memory that the file asks for.
+//! Broken volumes and maps in every format give one message that names the file and the fault, promptly and without
+//! allocating the memory that the file claims to need.
 
 mod fault;
 mod support;
@@ -170,13 +170,13 @@ fn a_broken_metaimage_is_named() {
     }
 }
 
-/// What a mebibyte of zeros becomes, `times` after one another.
+/// A compressed mebibyte of zeros, repeated `times` times.
 fn bomb(packed: &[u8], times: usize) -> Vec<u8> {
     packed.repeat(times)
 }
 
 #[test]
-fn a_packed_flood_drowns_nothing() {
+fn decompression_bombs_take_no_memory() {
     let zeros = vec![0; 1 << 20];
     let gzip = || {
         let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
@@ -188,7 +188,7 @@ fn a_packed_flood_drowns_nothing() {
         encoder.write_all(&vec![0; 1 << 26]).expect("writing to memory");
         encoder.finish().expect("writing to memory")
     };
-    // Asks for more than the stream can hold: told before it is unpacked.
+    // The header claims more than the stream can hold: refused before it is decompressed.
     let lies = "type: uchar\ndimension: 3\nsizes: 1000000 1000000 1000000\nencoding: gzip";
     file("../a.nrrd", nrrd(lies, &bomb(&gzip(), 2048)), &["a.nrrd", "cannot hold"]);
     let head = nifti(1, &[(42, &[255, 127, 255, 127, 255, 127])]);
@@ -197,7 +197,7 @@ fn a_packed_flood_drowns_nothing() {
                 ElementDataFile = LOCAL\n";
     file("../a.mha", [text.as_bytes(), &zlib()].concat(), &["a.mha", "cannot hold"]);
 
-    // Asks for little of a stream of two gibibytes: gets it, and takes no more.
+    // The header claims little of a stream of two gibibytes: no more than that is decompressed.
     let folder = Folder::new();
     folder
         .put("a.nrrd", nrrd("type: uchar\ndimension: 3\nsizes: 2 2 2\nencoding: gzip", &bomb(&gzip(), 2048)));

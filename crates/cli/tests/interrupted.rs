@@ -1,5 +1,5 @@
-//! Runs that cannot end as they should: Ctrl-C, a full disk, a folder or a reader that takes nothing. The message says
-//! so, and nothing half-written is left behind.
+//! Runs that cannot finish: Ctrl-C, a full disk, an unwritable folder, a closed pipe. The message says so, and nothing
+//! half-written is left behind.
 
 mod support;
 
@@ -20,7 +20,7 @@ fn with_scene() -> Folder {
     folder
 }
 
-/// Runs what must fail with status 1 and one message, which it returns.
+/// Runs a command that must fail with status 1 and one message; returns the message.
 fn fails(mut command: Command) -> String {
     let ended = command.stderr(Stdio::piped()).output().expect("the program runs");
     let stderr = String::from_utf8_lossy(&ended.stderr).into_owned();
@@ -29,7 +29,7 @@ fn fails(mut command: Command) -> String {
     stderr
 }
 
-/// What writes to standard output.
+/// Commands that write to standard output.
 const TALKERS: [&[&str]; 7] = [
     &["schema"],
     &["presets"],
@@ -41,7 +41,7 @@ const TALKERS: [&[&str]; 7] = [
 ];
 
 #[test]
-fn a_reader_that_goes_away_is_told() {
+fn a_closed_pipe_is_reported() {
     for arguments in TALKERS {
         let folder = with_scene();
         let (reader, writer) = std::io::pipe().expect("a pipe");
@@ -56,7 +56,7 @@ fn a_reader_that_goes_away_is_told() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_disk_is_told() {
+fn a_full_disk_is_reported() {
     let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
     for arguments in TALKERS {
         let folder = with_scene();
@@ -70,7 +70,7 @@ fn a_full_disk_is_told() {
     assert!(message.contains("/dev/full: statistics cannot be written: No space left"), "{message}");
 }
 
-/// A disk that is full in the middle of a picture, by a limit on the size of files.
+/// A disk that fills up in the middle of a picture, simulated by a limit on the size of files.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_picture_that_does_not_fit_leaves_nothing() {
@@ -78,7 +78,7 @@ fn a_picture_that_does_not_fit_leaves_nothing() {
         let folder = with_scene();
         folder.put(&format!("out/a.{kind}"), "what was there before");
         let mut command = Command::new("sh");
-        // Without the trap the system ends the program instead of refusing.
+        // Without the trap the signal ends the program; with it the write fails.
         command.args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_tyndall")]);
         command.args(["render", "../scene.toml", "--size", "64x64", "-o", &format!("a.{kind}")]);
         command.current_dir(folder.at("out"));
@@ -92,13 +92,13 @@ fn a_picture_that_does_not_fit_leaves_nothing() {
 
 #[cfg(unix)]
 #[test]
-fn a_folder_that_takes_no_files_is_told_before_the_work() {
+fn an_unwritable_folder_is_refused_before_the_work() {
     use std::os::unix::fs::PermissionsExt;
     let folder = with_scene();
     folder.put("out/closed/keep", "");
     let closed = folder.at("out/closed");
     std::fs::set_permissions(&closed, PermissionsExt::from_mode(0o555)).expect("its owner may");
-    // Who may do everything writes there too; for such a user the kernel's own folder takes no files.
+    // Root can write there too; `/proc` takes no files even from root.
     let place = if std::fs::write(closed.join("try"), "").is_ok() { "/proc" } else { "closed" };
     for (option, name) in [("-o", "a.png"), ("--stats", "a.json")] {
         let place = format!("{place}/{name}");
@@ -125,7 +125,7 @@ fn statistics_go_to_devices_and_pipes() {
         ended.stdout
     };
     assert!(run("/dev/null").is_empty());
-    assert!(!std::fs::metadata("/dev/null").expect("a device").is_file(), "it is a file now");
+    assert!(!std::fs::metadata("/dev/null").expect("a device").is_file(), "it was replaced by a file");
     let told: serde_json::Value = serde_json::from_slice(&run("/dev/stdout")).expect("JSON");
     assert_eq!(told["integrator"], "path");
     let made = Command::new("mkfifo").arg(folder.at("out/pipe")).status().expect("mkfifo runs");
@@ -143,7 +143,7 @@ fn interrupt(process: u32) {
     assert!(sent.success());
 }
 
-/// A render that says when its scene is loaded, which is now, and what it goes on to say.
+/// A running render that has just loaded its scene, and the rest of its standard error.
 #[cfg(unix)]
 fn started(folder: &Folder, options: &[&str]) -> (Child, BufReader<ChildStderr>) {
     let arguments = ["render", "../scene.toml", "--samples", "2000000000", "-v", "-o", "a.png"];
@@ -156,7 +156,7 @@ fn started(folder: &Folder, options: &[&str]) -> (Child, BufReader<ChildStderr>)
     (child, stderr)
 }
 
-/// Ends it by Ctrl-C; gives what it said.
+/// Ends it by Ctrl-C; returns what it printed.
 #[cfg(unix)]
 fn interrupted((mut child, mut stderr): (Child, BufReader<ChildStderr>)) -> String {
     interrupt(child.id());
@@ -168,13 +168,13 @@ fn interrupted((mut child, mut stderr): (Child, BufReader<ChildStderr>)) -> Stri
     rest
 }
 
-/// Ctrl-C in the middle of a render: what is there is written, and the status says so.
+/// Ctrl-C in the middle of a render: what has been rendered is written, and the exit status is that of an interrupt.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_render_leaves_a_readable_picture() {
     let folder = with_scene();
     let render = started(&folder, &[]);
-    // Long enough for a pass over all of 256 pixels.
+    // Long enough for a pass over all 256 pixels.
     std::thread::sleep(Duration::from_millis(500));
     interrupted(render);
     assert_eq!(files_in_out(&folder), ["a.png"]);
@@ -200,8 +200,8 @@ fn a_render_interrupted_before_its_first_sample_says_so() {
     assert!(files_in_out(&folder).is_empty());
 }
 
-/// Ctrl-C again and again from the moment in which a picture begins to appear: it is there whole, or not at all. On a fast
-/// disk the signals may come late; the ending itself is tested beside `atomic::abandon`.
+/// Ctrl-C repeatedly from the moment a picture file begins to be written: it is there whole, or not at all. On a fast
+/// disk the signals may come too late; the clean-up itself is tested beside `atomic::abandon`.
 #[cfg(unix)]
 #[test]
 fn a_picture_interrupted_while_it_is_written_is_whole_or_gone() {
@@ -213,7 +213,7 @@ fn a_picture_interrupted_while_it_is_written_is_whole_or_gone() {
         let mut child =
             folder.tyndall(&arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
         let begun = Instant::now();
-        // The empty one that is made to see whether the folder takes files is not meant.
+        // Not the empty file that only tests whether the folder is writable.
         let begins = |name: &String| {
             let about = std::fs::metadata(folder.at("out").join(name));
             name.ends_with(".part") && about.is_ok_and(|about| about.len() > 0)

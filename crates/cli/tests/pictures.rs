@@ -1,4 +1,4 @@
-//! Good runs: what is written, that it can be made again, and what the options change.
+//! Successful runs: what is written, that pictures can be rendered again, and what the options change.
 
 mod support;
 
@@ -32,7 +32,7 @@ fn brightness(folder: &Folder, options: &[&str]) -> f64 {
 }
 
 #[test]
-fn a_scene_becomes_pictures_of_all_kinds_that_tell_their_making() {
+fn a_scene_becomes_pictures_of_all_kinds_with_metadata() {
     let folder = with_scene(SCENE);
     let outputs = ["-o", "a.png", "-o", "a.jpg", "-o", "a.tif", "-o", "a.exr"];
     run(&folder, &[&["render", "../scene.toml", "--seed", "7"], &outputs[..]].concat());
@@ -52,7 +52,7 @@ fn a_scene_becomes_pictures_of_all_kinds_that_tell_their_making() {
 }
 
 #[test]
-fn a_picture_is_made_again_to_the_byte_from_any_folder() {
+fn a_picture_is_rendered_again_to_the_byte_from_any_folder() {
     let folder = with_scene(
         "volume.path = 'data/v.nrrd'\nfilm.size = [16, 16]\nrender.samples = 2\nmedium.density = 0.7\n",
     );
@@ -64,11 +64,11 @@ fn a_picture_is_made_again_to_the_byte_from_any_folder() {
         run(&folder, &["render", "../scene.toml", "-o", &first, "--max-scatter", "3"]);
         run(&folder, &["render", &first, "-o", &here]);
         let bytes = |name: &str| written(&folder, name);
-        assert!(bytes(&first) == bytes(&here), "{kind}: another file");
-        // From one folder up the volume's path is another, and so is the text in the picture: the pixels are not.
+        assert!(bytes(&first) == bytes(&here), "{kind}: the file differs");
+        // From another folder the volume's path differs, and so does the metadata, but not the pixels.
         run(&folder, &["render", &first, "-o", &elsewhere]);
         run(&folder, &["render", &elsewhere, "-o", &here]);
-        assert!(bytes(&first) == bytes(&here), "{kind}: another file by way of another folder");
+        assert!(bytes(&first) == bytes(&here), "{kind}: the file differs after a render to another folder");
     }
 }
 
@@ -87,7 +87,7 @@ fn the_bits_are_the_same_on_any_number_of_threads() {
 }
 
 #[test]
-fn without_a_place_the_picture_goes_to_the_inputs_stem_here() {
+fn without_an_output_the_picture_goes_to_the_inputs_stem_in_the_current_folder() {
     let folder = with_scene(SCENE);
     run(&folder, &["render", "../scene.toml", "-q"]);
     assert_eq!(files_in_out(&folder), ["scene.png"]);
@@ -99,7 +99,7 @@ fn a_dash_is_standard_output() {
     let printed = run(&folder, &["render", "../scene.toml", "-o", "-"]);
     assert!(files_in_out(&folder).is_empty());
     run(&folder, &["render", "../scene.toml", "-o", "a.png"]);
-    assert!(printed == written(&folder, "a.png"), "another picture than in a file");
+    assert!(printed == written(&folder, "a.png"), "the picture differs from the one in a file");
 }
 
 #[test]
@@ -155,10 +155,10 @@ fn assignments_reach_every_part_of_a_scene() {
     let second = lamp.replace("lights.0", "lights.1");
     let two = brightness(&folder, &["--set", lamp, "--set", &second, "--samples", "64"]);
     assert!(1.5 * one < two && two < 2.5 * one, "{two} of {one}");
-    // A light that becomes another one loses its place and strength.
+    // A light whose type changes loses its position and intensity.
     let switched = ["--set", lamp, "--set", "lights.0.type=environment", "--set", "lights.0.radiance=1"];
     assert!(brightness(&folder, &switched) > 0.0);
-    // What is patched replaces its alternative, and an option of the command line replaces both.
+    // A patched key replaces its alternative, and a command-line option replaces both.
     let clear = "transfer_function.points=[{\"value\":0,\"opacity\":0}]";
     assert_eq!(brightness(&folder, &["-q", "--set", lamp, "--set", clear]), 0.0);
     let solid = ["--set", lamp, "--set", clear, "--set", "transfer_function.preset=solid"];
@@ -167,7 +167,7 @@ fn assignments_reach_every_part_of_a_scene() {
 }
 
 #[test]
-fn the_order_of_scattering_adds_light() {
+fn more_orders_of_scattering_add_light() {
     let folder = with_scene(
         &format!("{SCENE}film.background = 0\nrender.samples = 64\n")
             .replace("render.samples = 4\n", "lights = [{ type = 'environment', radiance = 1 }]\n"),
@@ -236,14 +236,14 @@ fn the_brightest_light_still_has_a_mean_and_an_error() {
 }
 
 #[test]
-fn marks_and_line_ends_of_other_systems_are_no_fault() {
+fn byte_order_marks_and_crlf_are_accepted() {
     let folder = with_scene(&format!("\u{feff}{}", SCENE.replace('\n', "\r\n")));
     run(&folder, &["render", "../scene.toml"]);
     folder.put("scene.json", "\u{feff}{\r\n\"volume\": {\"procedural\": {\"size\": [4, 4, 4]}},\r\n\"film\": {\"size\": [4, 4]}}\r\n");
     run(&folder, &["render", "../scene.json", "--samples", "1"]);
 }
 
-/// As many lights as a program may write: they cost memory in proportion, and no time to speak of.
+/// As many lights as a script might write: they cost memory in proportion, and hardly any time.
 #[test]
 fn a_hundred_thousand_lights_are_rendered() {
     let light =
@@ -261,7 +261,7 @@ fn a_hundred_thousand_lights_are_rendered() {
 }
 
 #[test]
-fn every_stop_is_met() {
+fn every_stop_condition_works() {
     let folder = with_scene(SCENE);
     for most in ["1e300", "1.8e19", "1e18"] {
         assert_eq!(statistics(&folder, &["--samples", "2", "--time", most])["samples_per_pixel"], 2.0);
@@ -270,7 +270,7 @@ fn every_stop_is_met() {
     assert!(told["samples_per_pixel"].as_f64().is_some_and(|n| n >= 1.0), "{told}");
     let told = statistics(&folder, &["--target-error", "0.1"]);
     assert!(told["relative_error"].as_f64().is_some_and(|e| e <= 0.1), "{told}");
-    // Where there is no error to be told the scene's samples are the end.
+    // Without an error estimate rendering stops at the scene's samples.
     let told = statistics(&folder, &["--target-error", "0.1", "--integrator", "raymarch"]);
     assert_eq!(told["samples_per_pixel"], 4.0);
     let dark = ["--target-error", "0.1", "--set", "lights=[]", "--set", "film.background=0"];

@@ -1,4 +1,4 @@
-//! `tyndall replay`: edits against a live session, their reports, and edits files that are none.
+//! `tyndall replay`: edits against a live session, their reports, and invalid edits files.
 
 mod fault;
 mod support;
@@ -55,7 +55,7 @@ fn every_edit_is_reported_and_equals_a_render_from_nothing() {
         assert_eq!(names[..4], ["thicker", "brighter", "edit 3", "wider"]);
         let redone: Vec<_> =
             reports.iter().map(|r| r["recomputed"]["pixels"].as_f64().expect("a share")).collect();
-        // Samples that miss the cloud stay when its matter changes: half of them.
+        // Samples that miss the cloud, half of all, are kept when its matter changes.
         let (matter, method) = if integrator == "path" { (redone[0], 1.0) } else { (1.0, 0.0) };
         assert!((0.4..0.6).contains(&matter) || integrator == "raymarch", "{told}");
         assert_eq!(redone, [matter, 0.0, matter, 1.0, 1.0, 1.0, 1.0, 0.0, method, 0.0], "{told}");
@@ -69,7 +69,7 @@ fn every_edit_is_reported_and_equals_a_render_from_nothing() {
                 ["latency_s", "scratch_s", "speedup"].map(|key| report[key].as_f64().expect("a number"));
             assert!(latency > 0.0 && scratch > 0.0 && (speedup - scratch / latency).abs() < 1e-6 * speedup);
         }
-        // What the thicker cloud did not change was redone for nothing; where sizes differ there is nothing to compare.
+        // Samples that the thicker cloud did not change were taken again; where sizes differ nothing can be compared.
         assert!(reports[0]["false_positives"].as_u64() > Some(0), "{told}");
         assert_eq!(reports[3]["false_positives"], Value::Null);
         let table = String::from_utf8(ended.stdout).expect("text");
@@ -79,7 +79,7 @@ fn every_edit_is_reported_and_equals_a_render_from_nothing() {
 }
 
 #[test]
-fn light_paths_that_nobody_traced_are_not_wrong() {
+fn light_paths_that_were_not_traced_do_not_count_as_wrong() {
     let folder = with(&json!([
         { "patch": { "transfer_function": { "points": [{ "value": 0.3, "opacity": 0.5 }] } } },
         { "patch": { "render": { "max_scatter": 1 } } },
@@ -140,7 +140,7 @@ fn a_bad_edit_keeps_the_reports_before_it() {
     }
 }
 
-/// What a bad edit names is looked for in the edits file, not in the scene; and what there was before it is not lost.
+/// Errors of a bad edit refer to the edits file, not to the scene; and the picture before it is not lost.
 #[test]
 fn a_bad_edit_leaves_the_picture_before_it() {
     let edit = json!({ "patch": { "medium": { "density": 2 } } });
@@ -163,9 +163,9 @@ fn a_bad_edit_leaves_the_picture_before_it() {
     }
 }
 
-/// With `spatial = "off"` light stays where it was, as in the paper.
+/// With `spatial = "off"` segments are not redone for photons that changed near them, as in the paper.
 #[test]
-fn a_picture_that_is_not_the_one_from_nothing_is_warned_of() {
+fn a_picture_that_is_not_the_one_from_nothing_gives_a_warning() {
     let lights = json!([{ "type": "point", "position": [0, 20, 0], "intensity": [900, 900, 900] }]);
     let folder = with(&json!([{ "patch": { "lights": lights } }, { "patch": {} }]));
     let photon = ["--verify", "--integrator", "photon", "--set", "render.photon.photons=5000"];
@@ -179,7 +179,7 @@ fn a_picture_that_is_not_the_one_from_nothing_is_warned_of() {
 }
 
 #[test]
-fn what_is_no_edits_file_is_told_before_the_work() {
+fn an_invalid_edits_file_is_refused_before_the_work() {
     let mut deep = "[".repeat(100_000);
     deep.push_str(&"]".repeat(100_000));
     for (edits, says) in [

@@ -1,4 +1,4 @@
-//! What is told beside pictures: what the loader understood, notes, lists.
+//! What is printed besides pictures: what the loader understood, notes, lists.
 
 mod support;
 
@@ -44,7 +44,7 @@ fn a_picture_without_matter_is_noted() {
     }
 }
 
-/// No picture has holes: the first sample of every pixel is taken whatever time it takes, here some seconds for light paths.
+/// No picture has holes: the first sample of every pixel is taken however long it takes (here, some seconds).
 #[test]
 fn a_first_sample_past_the_time_is_noted() {
     let folder = Folder::new();
@@ -59,10 +59,10 @@ fn a_first_sample_past_the_time_is_noted() {
     assert!(stderr.contains(note) && stderr.lines().count() == 1, "{stderr}");
 }
 
-/// What `info` tells of samples that are no numbers: how many, and that NaN and minus infinity count as the
+/// What `info` reports about samples that are not finite: how many, and that NaN and minus infinity count as the
 /// smallest value, infinity as the largest.
 #[test]
-fn samples_that_are_no_numbers_are_counted_and_read_as_an_end_of_the_range() {
+fn non_finite_samples_are_counted_and_read_as_the_ends_of_the_range() {
     let values = [f64::NAN, 2.0, f64::INFINITY, 3.0, f64::NEG_INFINITY, 4.0, 2.0, 3.5];
     #[expect(clippy::cast_possible_truncation, reason = "short numbers")]
     let single = values.map(|v| (v as f32).to_le_bytes()).concat();
@@ -84,7 +84,7 @@ fn samples_that_are_no_numbers_are_counted_and_read_as_an_end_of_the_range() {
     }
 }
 
-/// Pictures of older versions carry a key at its old place.
+/// Pictures of older versions have a key at its old place.
 #[test]
 fn a_key_at_its_old_place_is_read_with_a_note() {
     let folder = Folder::new();
@@ -100,7 +100,7 @@ fn a_key_at_its_old_place_is_read_with_a_note() {
         stderr.contains("render.path.majorant_cell") && stderr.contains("medium.majorant_cell"),
         "{stderr}"
     );
-    // An option counts for more than the file.
+    // An option takes precedence over the file.
     let Ended { status, stderr, .. } =
         folder.run(&["render", "../old.toml", "--set", "medium.majorant_cell=2", "-o", "b.png"]);
     assert_eq!((status, stderr.contains("note")), (Some(0), true), "{stderr}");
@@ -112,7 +112,7 @@ fn a_key_at_its_old_place_is_read_with_a_note() {
 }
 
 #[test]
-fn what_the_loader_understood_is_told() {
+fn what_the_loader_understood_is_printed() {
     let folder = Folder::new();
     let head = "NRRD0004\ntype: short\ndimension: 3\nsizes: 3 2 1\nspace: LPS\n\
                 space directions: (2,0,0) (0,3,0) (0,0,4)\nspace origin: (5,6,7)\nencoding: raw\nendian: little\n\n";

@@ -1,30 +1,29 @@
-//! Runs that are to fail: what the program must say and do, and what it must not.
+//! Runs that must fail: what the program must say and do, and what it must not.
 #![allow(dead_code, reason = "each file of tests uses what it needs")]
 
 use crate::support::{Ended, Folder};
 use std::time::Duration;
 
-/// A refusal takes a few hundredths of a second, and is to take less than one; the rest is for machines that do other
-/// work besides.
+/// A refusal takes a few hundredths of a second, and must take less than one; the limit leaves room for busy machines.
 pub const LONGEST: Duration = Duration::from_secs(5);
 
-/// Memory for a refusal, in bytes.
+/// Memory limit for a refusal, in bytes.
 pub const MOST_MEMORY: u64 = 1 << 30;
 
-/// Keys of a scene that is sound as far as it goes; what is wrong is added below.
+/// Keys of a valid scene; tests append what is wrong.
 pub const SCENE: &str = "volume.procedural = { kind = 'sphere', size = [4, 4, 4] }\nrender.samples = 1\n";
 
-/// A run that is to fail.
+/// A run that must fail.
 pub struct Fault {
     pub files: Vec<(&'static str, Vec<u8>)>,
     pub arguments: Vec<&'static str>,
     pub status: i32,
-    /// Words of the message.
+    /// Text that the message must contain.
     pub says: Vec<&'static str>,
 }
 
 impl Fault {
-    /// What must be; the folder `out`, in which the program runs, must stay empty.
+    /// Runs and checks it; the folder `out`, in which the program runs, must stay empty.
     pub fn check(&self) {
         let folder = Folder::new();
         for (name, bytes) in &self.files {
@@ -54,20 +53,20 @@ impl Fault {
     }
 }
 
-/// The content of a file at fault: exit status 1.
+/// A faulty file: exit status 1.
 pub fn file(name: &'static str, bytes: impl Into<Vec<u8>>, says: &[&'static str]) {
     let arguments = vec!["render", name];
     Fault { files: vec![(&name["../".len()..], bytes.into())], arguments, status: 1, says: says.to_vec() }
         .check();
 }
 
-/// A scene in TOML at fault, with a file of eight bytes beside it.
+/// A faulty scene in TOML, with a file of eight bytes beside it.
 pub fn toml(text: String, says: &[&'static str]) {
     let files = vec![("scene.toml", text.into_bytes()), ("eight.raw", vec![0; 8])];
     Fault { files, arguments: vec!["render", "../scene.toml"], status: 1, says: says.to_vec() }.check();
 }
 
-/// Options at fault beside a sound scene.
+/// Faulty options with a valid scene.
 pub fn options(options: &[&'static str], status: i32, says: &[&'static str]) {
     let files = vec![("scene.toml", SCENE.into())];
     let arguments = [&["render", "../scene.toml"], options].concat();

@@ -1,4 +1,4 @@
-//! Runs the built program in folders that vanish afterwards.
+//! Runs the built program in temporary folders.
 #![allow(dead_code, reason = "each file of tests uses what it needs")]
 
 use std::fs::{self, File};
@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// A run that takes longer hangs: all here take a fraction of a second, on a busy machine a few.
+/// A run that takes longer hangs: all here take a fraction of a second, or a few seconds on a busy machine.
 const HANGS: Duration = Duration::from_secs(60);
 
 /// A folder with the files of a test.
@@ -21,7 +21,7 @@ pub struct Ended {
     pub stderr: String,
     /// How long it ran.
     pub took: Duration,
-    /// The most memory that was seen resident, in bytes; 0 where the system does not tell.
+    /// The largest resident memory seen, in bytes; 0 where the system does not report it.
     pub memory: u64,
 }
 
@@ -30,19 +30,19 @@ impl Folder {
         Self(tempfile::tempdir().expect("a temporary folder"))
     }
 
-    /// The place of `name`, which begins at the folder.
+    /// The path of `name`, which is relative to this folder.
     pub fn at(&self, name: &str) -> PathBuf {
         self.0.path().join(name)
     }
 
-    /// Puts a file there, with the folders that it needs.
+    /// Writes a file there, and creates the folders that it needs.
     pub fn put(&self, name: &str, bytes: impl AsRef<[u8]>) {
         let path = self.at(name);
         fs::create_dir_all(path.parent().expect("a place in the folder")).expect("a folder");
         fs::write(path, bytes).expect("a file");
     }
 
-    /// The program, to be run here, with the folder `out` in this one as its own.
+    /// The program, ready to run with the folder `out` in this one as its working directory.
     pub fn tyndall(&self, arguments: &[&str]) -> Command {
         let out = self.at("out");
         fs::create_dir_all(&out).expect("a folder");
@@ -51,7 +51,7 @@ impl Folder {
         command
     }
 
-    /// Runs the program to its end, from the folder `out` in this one.
+    /// Runs the program to its end, with the folder `out` in this one as its working directory.
     pub fn run(&self, arguments: &[&str]) -> Ended {
         let [stdout, stderr] = ["stdout", "stderr"].map(|name| self.at(name));
         let mut command = self.tyndall(arguments);
@@ -78,14 +78,14 @@ impl Folder {
     }
 }
 
-/// The largest resident memory of a running process so far; 0 where the system does not tell.
+/// The largest resident memory of a running process so far; 0 where the system does not report it.
 fn peak_memory(process: u32) -> u64 {
     let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok()).unwrap_or(0) << 10
 }
 
-/// Runs what must go well; returns what it printed.
+/// A run that must succeed without a message; returns what it printed.
 pub fn run(folder: &Folder, arguments: &[&str]) -> Vec<u8> {
     let Ended { status, stdout, stderr, .. } = folder.run(arguments);
     assert_eq!((status, stderr.as_str()), (Some(0), ""), "{arguments:?}");
@@ -110,7 +110,7 @@ pub fn written(folder: &Folder, name: &str) -> Vec<u8> {
     fs::read(folder.at("out").join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
-/// The names in the folder in which the program ran, in order.
+/// The names in the folder in which the program ran, sorted.
 pub fn files_in_out(folder: &Folder) -> Vec<String> {
     let entries = fs::read_dir(folder.at("out")).expect("a folder");
     let mut names: Vec<_> =
