@@ -28,8 +28,8 @@ pub fn pool(threads: Option<u16>) -> Result<Arc<rayon::ThreadPool>, Failure> {
 /// the second ends at once.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt {
-    asks: Arc<AtomicBool>,
-    asked: Arc<AtomicBool>,
+    picture_begun: Arc<AtomicBool>,
+    requested: Arc<AtomicBool>,
 }
 
 impl Interrupt {
@@ -39,7 +39,7 @@ impl Interrupt {
         let heard = interrupt.clone();
         // Without a handler Ctrl-C still ends the program, but saves no picture.
         drop(ctrlc::set_handler(move || {
-            if !heard.asks.load(Ordering::Relaxed) || heard.asked.swap(true, Ordering::Relaxed) {
+            if !heard.picture_begun.load(Ordering::Relaxed) || heard.requested.swap(true, Ordering::Relaxed) {
                 let _nothing_half_written = tyndall_formats::atomic::abandon();
                 std::process::exit(130);
             }
@@ -48,17 +48,17 @@ impl Interrupt {
     }
 
     /// From now on there is a picture to save: the first Ctrl-C only requests an end.
-    pub fn ask_from_now_on(&self) {
-        self.asks.store(true, Ordering::Relaxed);
+    pub fn picture_begins(&self) {
+        self.picture_begun.store(true, Ordering::Relaxed);
     }
 
     /// Whether an end was requested.
-    pub fn asked(&self) -> bool {
-        self.asked.load(Ordering::Relaxed)
+    pub fn is_requested(&self) -> bool {
+        self.requested.load(Ordering::Relaxed)
     }
 
     /// The flag itself, for sessions to poll.
     pub fn flag(&self) -> Arc<AtomicBool> {
-        self.asked.clone()
+        self.requested.clone()
     }
 }

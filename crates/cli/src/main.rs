@@ -70,9 +70,9 @@ fn say(text: &str) -> Result<(), Failure> {
 
 /// The failure of a write to stdout.
 fn stdout_failure(error: &std::io::Error) -> Failure {
-    let mend = match error.kind() {
+    let fix = match error.kind() {
         ErrorKind::BrokenPipe => "its reader must stay open to the end",
         _ => "redirect it elsewhere",
     };
-    Failure::input(format!("standard output: {error}; {mend}"))
+    Failure::input(format!("standard output: {error}; {fix}"))
 }

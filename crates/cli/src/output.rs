@@ -13,7 +13,7 @@ use tyndall_live::document::{Background, Document, Light, Tone};
 const STDOUT: &str = "-";
 
 /// Where pictures go: the paths given, or the input's stem with .png in the current folder.
-pub fn places(asked: &[PathBuf], input: &Path) -> Vec<PathBuf> {
+pub fn paths(asked: &[PathBuf], input: &Path) -> Vec<PathBuf> {
     if !asked.is_empty() {
         return asked.to_vec();
     }
@@ -27,27 +27,27 @@ pub fn places(asked: &[PathBuf], input: &Path) -> Vec<PathBuf> {
 /// Refuses, before any work, paths that cannot be written and paths that are named twice.
 pub fn check(pictures: &[PathBuf], statistics: Option<&Path>) -> Result<(), Failure> {
     let mut taken = BTreeSet::new();
-    for place in pictures.iter().map(PathBuf::as_path).chain(statistics) {
-        if !taken.insert(absolute(place)) {
-            let place = tyndall::message::path_name(place);
+    for path in pictures.iter().map(PathBuf::as_path).chain(statistics) {
+        if !taken.insert(absolute(path)) {
+            let path = tyndall::message::path_name(path);
             return Err(Failure::usage(format!(
-                "`{place}` would be written twice; expected a different path for each output"
+                "`{path}` would be written twice; expected a different path for each output"
             )));
         }
     }
-    for place in pictures.iter().filter(|p| p.as_os_str() != STDOUT) {
-        tyndall_formats::image::check_destination(place).map_err(Failure::usage)?;
+    for path in pictures.iter().filter(|p| p.as_os_str() != STDOUT) {
+        tyndall_formats::image::check_destination(path).map_err(Failure::usage)?;
     }
     match statistics.filter(|p| p.as_os_str() != STDOUT) {
-        Some(place) => tyndall_formats::atomic::check(place)
-            .map_err(|e| Failure::usage(format!("--stats {}", unwritable(place, &e)))),
+        Some(path) => tyndall_formats::atomic::check(path)
+            .map_err(|e| Failure::usage(format!("--stats {}", unwritable(path, &e)))),
         None => Ok(()),
     }
 }
 
 /// Writes the film to every path.
 pub fn pictures(
-    places: &[PathBuf],
+    paths: &[PathBuf],
     film: &Film,
     document: &Document,
     source_folder: &Path,
@@ -68,16 +68,16 @@ pub fn pictures(
         Tone::Aces => ToneCurve::Aces,
     };
     let display = Display { tone, exposure: document.film.exposure };
-    for place in places {
-        let to_stdout = place.as_os_str() == STDOUT;
-        let folder = if to_stdout { Path::new("") } else { place.parent().unwrap_or(Path::new("")) };
+    for path in paths {
+        let to_stdout = path.as_os_str() == STDOUT;
+        let folder = if to_stdout { Path::new("") } else { path.parent().unwrap_or(Path::new("")) };
         let metadata = metadata(film, document, source_folder, folder);
         if to_stdout {
             let bytes = encode_png(&picture, &display, &metadata).map_err(Failure::input)?;
             let mut out = std::io::stdout().lock();
             out.write_all(&bytes).and_then(|()| out.flush()).map_err(|e| stdout_failure(&e))?;
         } else {
-            write(place, &picture, &display, &metadata).map_err(Failure::input)?;
+            write(path, &picture, &display, &metadata).map_err(Failure::input)?;
         }
     }
     Ok(())
@@ -129,18 +129,17 @@ fn absolute(path: &Path) -> PathBuf {
 }
 
 /// Writes statistics as JSON.
-pub fn statistics(place: &Path, value: &serde_json::Value) -> Result<(), Failure> {
+pub fn statistics(path: &Path, value: &serde_json::Value) -> Result<(), Failure> {
     let text = format!("{value:#}\n");
-    if place.as_os_str() == STDOUT {
+    if path.as_os_str() == STDOUT {
         return say(&text);
     }
-    tyndall_formats::atomic::replace(place, text.as_bytes())
-        .map_err(|e| Failure::input(unwritable(place, &e)))
+    tyndall_formats::atomic::replace(path, text.as_bytes()).map_err(|e| Failure::input(unwritable(path, &e)))
 }
 
-fn unwritable(place: &Path, error: &std::io::Error) -> String {
-    let place = tyndall::message::path_name(place);
-    format!("{place}: statistics cannot be written: {error}; name a file in a writable folder, or `-`")
+fn unwritable(path: &Path, error: &std::io::Error) -> String {
+    let path = tyndall::message::path_name(path);
+    format!("{path}: statistics cannot be written: {error}; name a file in a writable folder, or `-`")
 }
 
 #[cfg(test)]
@@ -149,10 +148,10 @@ mod tests {
 
     #[test]
     fn the_default_path_is_the_stem_in_the_current_folder() {
-        let place = |input: &str| places(&[], Path::new(input))[0].to_string_lossy().into_owned();
-        assert_eq!(place("a/head.nrrd"), "head.png");
-        assert_eq!(place("a/b.c/head.nii.gz"), "head.png");
-        assert_eq!(place("scene.toml"), "scene.png");
+        let path = |input: &str| paths(&[], Path::new(input))[0].to_string_lossy().into_owned();
+        assert_eq!(path("a/head.nrrd"), "head.png");
+        assert_eq!(path("a/b.c/head.nii.gz"), "head.png");
+        assert_eq!(path("scene.toml"), "scene.png");
     }
 
     #[test]

@@ -41,8 +41,8 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let threads = pool(options.run.threads)?;
     let level = vector_instructions()?;
     let mut input = Input::open(&options.input).map_err(Failure::input)?;
-    let places = output::places(&options.outputs, &options.input);
-    output::check(&places, options.run.stats.as_deref())?;
+    let paths = output::paths(&options.outputs, &options.input);
+    output::check(&paths, options.run.stats.as_deref())?;
 
     overrides::lay_over(&mut input, &options.scene, options.samples)?;
     let on = Options { threads: threads.clone(), level, edits: false };
@@ -70,11 +70,11 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         // An error estimate needs two samples.
         usual_samples: samples.max(2),
     };
-    interrupt.ask_from_now_on();
+    interrupt.picture_begins();
     let display = Display::new(options.progress, options.run.quiet);
     refine(&mut live, &stop, &interrupt.flag(), display);
     let rendered = stages.end("render");
-    let interrupted = interrupt.asked();
+    let interrupted = interrupt.is_requested();
     if interrupted && live.film().mean_samples() == 0.0 {
         if !options.run.quiet {
             drop(writeln!(std::io::stderr(), "tyndall: interrupted before there was anything to write"));
@@ -92,9 +92,9 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     }
     note(&format!("{:.2} samples per pixel in {rendered:.2} s", live.film().mean_samples()));
 
-    output::pictures(&places, live.film(), live.document(), live.folder())?;
+    output::pictures(&paths, live.film(), live.document(), live.folder())?;
     stages.end("write");
-    if let Some(place) = &options.run.stats {
+    if let Some(path) = &options.run.stats {
         let film = live.film();
         let statistics = json!({
             "integrator": live.scene().render.method.name(),
@@ -110,7 +110,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
             "simd": level.name(),
             "seed": live.scene().render.seed,
         });
-        output::statistics(place, &statistics)?;
+        output::statistics(path, &statistics)?;
     }
     if interrupted { Err(Failure::Interrupted) } else { Ok(()) }
 }
@@ -120,7 +120,7 @@ fn refine(live: &mut LiveSession, stop: &StopConditions, cancel: &Arc<AtomicBool
     let begun = Instant::now();
     // A deadline that the clock cannot represent is no limit.
     let end = stop.time.and_then(|time| begun.checked_add(time));
-    let mut looked = begun;
+    let mut last_estimate = begun;
     let mut error = None;
     loop {
         let slice = Instant::now() + SLICE;
@@ -137,8 +137,8 @@ fn refine(live: &mut LiveSession, stop: &StopConditions, cancel: &Arc<AtomicBool
         let seconds = begun.elapsed().as_secs_f64();
         let samples_done = film.samples() >= stop.samples;
         let all_taken = film.samples() >= samples;
-        if looked.elapsed() >= ERROR_EVERY || all_taken || begun.elapsed() < ERROR_EVERY {
-            looked = Instant::now();
+        if last_estimate.elapsed() >= ERROR_EVERY || all_taken || begun.elapsed() < ERROR_EVERY {
+            last_estimate = Instant::now();
             error = live.session().relative_error();
         }
         let time_is_up = film.samples() > 0 && end.is_some_and(|end| Instant::now() >= end);

@@ -25,7 +25,7 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
     overrides::lay_over(&mut input, &options.scene, options.samples)?;
     let on = Options { threads: threads.clone(), level, edits: true };
     let mut live = LiveSession::start(input, on).map_err(Failure::input)?;
-    interrupt.ask_from_now_on();
+    interrupt.picture_begins();
     let run = Run { verify: options.verify, interrupt: &interrupt };
     let begun = Instant::now();
     run.refine(&mut live, 1);
@@ -67,7 +67,7 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
         }
     }
 
-    if let Some(place) = &options.run.stats {
+    if let Some(path) = &options.run.stats {
         let statistics = json!({
             "integrator": live.scene().render.method.name(),
             "size": live.film().size(),
@@ -77,7 +77,7 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
             "first_s": first_s,
             "edits": reports,
         });
-        output::statistics(place, &statistics)?;
+        output::statistics(path, &statistics)?;
     }
     // Also when an edit was bad: the picture before it is not lost.
     if !options.outputs.is_empty() && live.film().samples() > 0 {
@@ -86,7 +86,7 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
         output::pictures(&options.outputs, live.film(), live.document(), live.folder())?;
     }
     played?;
-    if interrupt.asked() { Err(Failure::Interrupted) } else { Ok(()) }
+    if interrupt.is_requested() { Err(Failure::Interrupted) } else { Ok(()) }
 }
 
 /// What one edit cost, and its result.
@@ -138,7 +138,7 @@ fn play(live: &mut LiveSession, edit: &Edit, at: &str, run: &Run) -> Result<Repo
         .notes;
     run.refine(live, 1);
     let latency_s = begun.elapsed().as_secs_f64();
-    if run.interrupt.asked() {
+    if run.interrupt.is_requested() {
         return Err(Failure::Interrupted);
     }
     let recomputed = live.session().recomputed();
@@ -163,7 +163,7 @@ fn check(
     let samples = live.document().render.samples.max(live.film().samples());
     run.refine(live, samples);
     run.refine(&mut fresh, samples);
-    if run.interrupt.asked() {
+    if run.interrupt.is_requested() {
         return Err(Failure::Interrupted);
     }
     let computed = live.report().items_computed;

@@ -126,15 +126,15 @@ fn statistics_go_to_devices_and_pipes() {
     };
     assert!(run("/dev/null").is_empty());
     assert!(!std::fs::metadata("/dev/null").expect("a device").is_file(), "it was replaced by a file");
-    let told: serde_json::Value = serde_json::from_slice(&run("/dev/stdout")).expect("JSON");
-    assert_eq!(told["integrator"], "path");
+    let report: serde_json::Value = serde_json::from_slice(&run("/dev/stdout")).expect("JSON");
+    assert_eq!(report["integrator"], "path");
     let made = Command::new("mkfifo").arg(folder.at("out/pipe")).status().expect("mkfifo runs");
     assert!(made.success());
     let pipe = folder.at("out/pipe");
     let reader = std::thread::spawn(move || std::fs::read(pipe).expect("what was written"));
     run("pipe");
-    let told: serde_json::Value = serde_json::from_slice(&reader.join().expect("a reader")).expect("JSON");
-    assert_eq!(told["integrator"], "path");
+    let report: serde_json::Value = serde_json::from_slice(&reader.join().expect("a reader")).expect("JSON");
+    assert_eq!(report["integrator"], "path");
 }
 
 #[cfg(unix)]
@@ -195,8 +195,8 @@ fn a_render_interrupted_before_its_first_sample_says_so() {
         ["--integrator", "photon", "--max-scatter", "1000000", "--set", white, "--set", "medium.density=900"];
     let render = started(&folder, &photon);
     std::thread::sleep(Duration::from_millis(200));
-    let told = interrupted(render);
-    assert_eq!(told, "tyndall: interrupted before there was anything to write\n");
+    let report = interrupted(render);
+    assert_eq!(report, "tyndall: interrupted before there was anything to write\n");
     assert!(files_in_out(&folder).is_empty());
 }
 

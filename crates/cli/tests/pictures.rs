@@ -105,23 +105,23 @@ fn a_dash_is_standard_output() {
 #[test]
 fn statistics_have_all_their_keys() {
     let folder = with_scene(SCENE);
-    let told = statistics(&folder, &["--threads", "2"]);
-    assert_eq!(told["integrator"], "path");
-    assert_eq!(told["size"], serde_json::json!([16, 16]));
-    assert_eq!(told["samples_per_pixel"], 4.0);
-    assert_eq!(told["threads"], 2);
-    assert_eq!(told["seed"], 0);
-    let number = |key: &str| told[key].as_f64().unwrap_or_else(|| panic!("{key} in {told}"));
-    assert!(number("wall_s") >= number("load_s") && number("load_s") > 0.0, "{told}");
-    assert!(number("relative_error") > 0.0, "{told}");
-    assert!(told["peak_memory_bytes"].as_u64().is_some_and(|bytes| bytes > 1 << 20), "{told}");
+    let report = statistics(&folder, &["--threads", "2"]);
+    assert_eq!(report["integrator"], "path");
+    assert_eq!(report["size"], serde_json::json!([16, 16]));
+    assert_eq!(report["samples_per_pixel"], 4.0);
+    assert_eq!(report["threads"], 2);
+    assert_eq!(report["seed"], 0);
+    let number = |key: &str| report[key].as_f64().unwrap_or_else(|| panic!("{key} in {report}"));
+    assert!(number("wall_s") >= number("load_s") && number("load_s") > 0.0, "{report}");
+    assert!(number("relative_error") > 0.0, "{report}");
+    assert!(report["peak_memory_bytes"].as_u64().is_some_and(|bytes| bytes > 1 << 20), "{report}");
     assert!(
-        told["stages"].as_object().is_some_and(|s| s.values().all(serde_json::Value::is_number)),
-        "{told}"
+        report["stages"].as_object().is_some_and(|s| s.values().all(serde_json::Value::is_number)),
+        "{report}"
     );
-    assert_eq!(told["mean_radiance"].as_array().map(Vec::len), Some(3), "{told}");
-    let told = statistics(&folder, &["--integrator", "raymarch"]);
-    assert!(told["integrator"] == "raymarch" && told["relative_error"].is_null(), "{told}");
+    assert_eq!(report["mean_radiance"].as_array().map(Vec::len), Some(3), "{report}");
+    let report = statistics(&folder, &["--integrator", "raymarch"]);
+    assert!(report["integrator"] == "raymarch" && report["relative_error"].is_null(), "{report}");
     run(&folder, &["render", "../scene.toml", "--stats", "a.json"]);
     assert_eq!(json(&written(&folder, "a.json"))["seed"], 0);
 }
@@ -129,18 +129,18 @@ fn statistics_have_all_their_keys() {
 #[test]
 fn options_win_over_assignments_and_these_over_the_scene() {
     let folder = with_scene(SCENE);
-    let told = statistics(
+    let report = statistics(
         &folder,
         &["--set", "render.seed=9", "--set", "film.size=[8,8]", "--set", "render.samples=3", "--seed", "5"],
     );
-    assert_eq!(told["seed"], 5);
-    assert_eq!(told["size"], serde_json::json!([8, 8]));
-    assert_eq!(told["samples_per_pixel"], 3.0);
-    let told = statistics(&folder, &["--size", "4x6", "--set", "film.size.0=7", "--samples", "2"]);
-    assert_eq!(told["size"], serde_json::json!([4, 6]));
-    assert_eq!(told["samples_per_pixel"], 2.0);
-    let told = statistics(&folder, &["--set", "render.integrator=path", "--integrator", "raymarch"]);
-    assert_eq!(told["integrator"], "raymarch");
+    assert_eq!(report["seed"], 5);
+    assert_eq!(report["size"], serde_json::json!([8, 8]));
+    assert_eq!(report["samples_per_pixel"], 3.0);
+    let report = statistics(&folder, &["--size", "4x6", "--set", "film.size.0=7", "--samples", "2"]);
+    assert_eq!(report["size"], serde_json::json!([4, 6]));
+    assert_eq!(report["samples_per_pixel"], 2.0);
+    let report = statistics(&folder, &["--set", "render.integrator=path", "--integrator", "raymarch"]);
+    assert_eq!(report["integrator"], "raymarch");
 }
 
 #[test]
@@ -229,10 +229,10 @@ fn bare_volumes_of_odd_kinds_are_never_black() {
 #[test]
 fn the_brightest_light_still_has_a_mean_and_an_error() {
     let folder = with_scene(&format!("{SCENE}lights = [{{ type = 'environment', radiance = 1e18 }}]\n"));
-    let told = statistics(&folder, &[]);
-    let mean = told["mean_radiance"][0].as_f64().unwrap_or_else(|| panic!("a mean in {told}"));
-    assert!((1e17..=1.1e18).contains(&mean), "{told}");
-    assert!(told["relative_error"].as_f64().is_some_and(f64::is_finite), "{told}");
+    let report = statistics(&folder, &[]);
+    let mean = report["mean_radiance"][0].as_f64().unwrap_or_else(|| panic!("a mean in {report}"));
+    assert!((1e17..=1.1e18).contains(&mean), "{report}");
+    assert!(report["relative_error"].as_f64().is_some_and(f64::is_finite), "{report}");
 }
 
 #[test]
@@ -266,13 +266,13 @@ fn every_stop_condition_works() {
     for most in ["1e300", "1.8e19", "1e18"] {
         assert_eq!(statistics(&folder, &["--samples", "2", "--time", most])["samples_per_pixel"], 2.0);
     }
-    let told = statistics(&folder, &["--time", "0.01"]);
-    assert!(told["samples_per_pixel"].as_f64().is_some_and(|n| n >= 1.0), "{told}");
-    let told = statistics(&folder, &["--target-error", "0.1"]);
-    assert!(told["relative_error"].as_f64().is_some_and(|e| e <= 0.1), "{told}");
+    let report = statistics(&folder, &["--time", "0.01"]);
+    assert!(report["samples_per_pixel"].as_f64().is_some_and(|n| n >= 1.0), "{report}");
+    let report = statistics(&folder, &["--target-error", "0.1"]);
+    assert!(report["relative_error"].as_f64().is_some_and(|e| e <= 0.1), "{report}");
     // Without an error estimate rendering stops at the scene's samples.
-    let told = statistics(&folder, &["--target-error", "0.1", "--integrator", "raymarch"]);
-    assert_eq!(told["samples_per_pixel"], 4.0);
+    let report = statistics(&folder, &["--target-error", "0.1", "--integrator", "raymarch"]);
+    assert_eq!(report["samples_per_pixel"], 4.0);
     let dark = ["--target-error", "0.1", "--set", "lights=[]", "--set", "film.background=0"];
     assert!(statistics(&folder, &dark)["relative_error"].is_null());
 }

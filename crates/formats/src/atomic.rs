@@ -19,15 +19,15 @@ pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
         // Appended, because existing content must not be truncated: it may be a log.
         Destination::Stream => return OpenOptions::new().append(true).open(path)?.write_all(bytes),
     };
-    let (beside, mut file) = create_beside(&path)?;
+    let (unfinished_path, mut file) = create_beside(&path)?;
     let written = file.write_all(bytes).and_then(|()| file.sync_all());
     drop(file);
     let mut unfinished = unfinished();
-    unfinished.retain(|other| *other != beside);
-    let moved = written.and_then(|()| fs::rename(&beside, &path));
+    unfinished.retain(|other| *other != unfinished_path);
+    let moved = written.and_then(|()| fs::rename(&unfinished_path, &path));
     if moved.is_err() {
         // The first failure is reported; a leftover that cannot be removed is at least not at `path`.
-        drop(fs::remove_file(&beside));
+        drop(fs::remove_file(&unfinished_path));
     }
     moved
 }
@@ -39,11 +39,11 @@ pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
 pub fn check(path: &Path) -> Result<()> {
     // A stream is not opened as a test: opening a pipe can block until it has a reader.
     let Destination::File(path) = destination(path)? else { return Ok(()) };
-    let (beside, file) = create_beside(&path)?;
+    let (unfinished_path, file) = create_beside(&path)?;
     drop(file);
     let mut unfinished = unfinished();
-    unfinished.retain(|other| *other != beside);
-    fs::remove_file(beside)
+    unfinished.retain(|other| *other != unfinished_path);
+    fs::remove_file(unfinished_path)
 }
 
 /// Removes every unfinished file. While the returned value is held, no file is created or finished, so that the
@@ -51,9 +51,9 @@ pub fn check(path: &Path) -> Result<()> {
 #[must_use = "files can be created again once it is dropped"]
 pub fn abandon() -> impl Drop {
     let mut unfinished = unfinished();
-    for beside in unfinished.drain(..) {
+    for unfinished_path in unfinished.drain(..) {
         // The process is about to end; there is nobody to report an error to.
-        drop(fs::remove_file(beside));
+        drop(fs::remove_file(unfinished_path));
     }
     unfinished
 }
@@ -106,14 +106,14 @@ fn is_stream(_kind: fs::FileType) -> bool {
 fn create_beside(path: &Path) -> Result<(PathBuf, File)> {
     let folder = folder_of(path);
     for attempt in 0_u32.. {
-        let beside = folder.join(format!(".tyndall-{}-{attempt}.part", std::process::id()));
+        let unfinished_path = folder.join(format!(".tyndall-{}-{attempt}.part", std::process::id()));
         let mut unfinished = unfinished();
-        match OpenOptions::new().write(true).create_new(true).open(&beside) {
+        match OpenOptions::new().write(true).create_new(true).open(&unfinished_path) {
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
             Err(error) => return Err(error),
             Ok(file) => {
-                unfinished.push(beside.clone());
-                return Ok((beside, file));
+                unfinished.push(unfinished_path.clone());
+                return Ok((unfinished_path, file));
             }
         }
     }

@@ -222,6 +222,6 @@ pub fn check(live: &[u32], fresh: &[u32]) -> Result<(), Failure> {
     let Some((a, b)) = differing.next() else { return Ok(()) };
     let (count, all) = (1 + differing.count(), live.len());
     Err(Failure::input(format!(
-        "the picture after the edit is not the one from nothing: {count} of {all} numbers differ, the first is {a} in place of {b}"
+        "the picture after the edit is not the one from nothing: {count} of {all} numbers differ, the first is {a} instead of {b}"
     )))
 }

@@ -10,7 +10,7 @@ use tyndall::simd::Level;
 /// Seconds of `path` on a cloud as one size grows.
 pub fn curves(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str =
-        "growth: path on a cloud, two threads, 128 x 128, 4 samples, 8 scatterings unless told";
+        "growth: path on a cloud, two threads, 128 x 128, 4 samples, 8 scatterings unless stated";
     let bench = Bench::new(cloud(effort.pick(128, 32)), 2)?;
     let usual = json!({ "film": { "size": [128, 128] }, "render": { "max_scatter": 8 } });
     let mut rows = Vec::new();

@@ -31,25 +31,25 @@ impl Fault {
         }
         let Ended { status, stdout, stderr, took, memory } = folder.run(&self.arguments);
         let arguments = self.arguments.iter().map(|a| a.chars().take(200).collect::<String>());
-        let told = format!(
+        let report = format!(
             "{:?}, expected {:?}: status {status:?}\n{stderr}",
             arguments.collect::<Vec<_>>(),
             self.says
         );
-        assert_eq!(status, Some(self.status), "{told}");
-        assert!(!stderr.contains("panicked"), "{told}");
+        assert_eq!(status, Some(self.status), "{report}");
+        assert!(!stderr.contains("panicked"), "{report}");
         for word in &self.says {
-            assert!(stderr.contains(word), "`{word}` is not in {told}");
+            assert!(stderr.contains(word), "`{word}` is not in {report}");
         }
         let messages = stderr.lines().filter(|l| l.starts_with("tyndall: ") || l.starts_with("error: "));
-        assert_eq!(messages.count(), 1, "{told}");
-        assert!(stderr.len() < 1000, "{told}");
-        assert!(!stderr.contains(|c: char| c.is_control() && c != '\n'), "{told:?}");
-        assert!(took < LONGEST, "{took:?} for {told}");
-        assert!(memory < MOST_MEMORY, "{} MiB for {told}", memory >> 20);
-        assert!(stdout.is_empty(), "{told}");
+        assert_eq!(messages.count(), 1, "{report}");
+        assert!(stderr.len() < 1000, "{report}");
+        assert!(!stderr.contains(|c: char| c.is_control() && c != '\n'), "{report:?}");
+        assert!(took < LONGEST, "{took:?} for {report}");
+        assert!(memory < MOST_MEMORY, "{} MiB for {report}", memory >> 20);
+        assert!(stdout.is_empty(), "{report}");
         let left: Vec<_> = std::fs::read_dir(folder.at("out")).expect("a folder").collect();
-        assert!(left.is_empty(), "{left:?} left by {told}");
+        assert!(left.is_empty(), "{left:?} left by {report}");
     }
 }
 

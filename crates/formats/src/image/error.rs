@@ -19,27 +19,27 @@ pub enum ImageError {
         known: &'static str,
     },
     /// The file cannot be written.
-    #[error("{}: cannot write the picture: {source}; {mend}", path_name(path))]
+    #[error("{}: cannot write the picture: {source}; {fix}", path_name(path))]
     Unwritable {
         /// The file.
         path: PathBuf,
         /// The system's answer.
         source: Error,
         /// What to do.
-        mend: String,
+        fix: String,
     },
     /// The file cannot be read.
-    #[error("{}: cannot read the picture: {source}; {mend}", path_name(path))]
+    #[error("{}: cannot read the picture: {source}; {fix}", path_name(path))]
     Unreadable {
         /// The file.
         path: PathBuf,
         /// The system's answer.
         source: Error,
         /// What to do.
-        mend: String,
+        fix: String,
     },
     /// The picture has more pixels than the kind of file, or this program, can hold.
-    #[error("{}: {width} x {height} pixels, expected at most {limit}; {mend}", path_name(path))]
+    #[error("{}: {width} x {height} pixels, expected at most {limit}; {fix}", path_name(path))]
     TooLarge {
         /// The file.
         path: PathBuf,
@@ -50,7 +50,7 @@ pub enum ImageError {
         /// The limit, in words.
         limit: String,
         /// What to do.
-        mend: &'static str,
+        fix: &'static str,
     },
     /// The encoding library refused the picture.
     #[error("{}: cannot encode the picture: {}; try another kind of file", path_name(path), sentence(reason))]
@@ -107,7 +107,7 @@ impl ImageError {
 
     pub(super) fn unwritable(path: &Path, source: Error) -> Self {
         let folder = crate::atomic::folder_of(path);
-        let mend = match source.kind() {
+        let fix = match source.kind() {
             ErrorKind::NotFound => format!("create the folder {} first", path_name(folder)),
             ErrorKind::NotADirectory => {
                 format!("choose another place: {} is not a folder", path_name(folder))
@@ -122,16 +122,16 @@ impl ImageError {
             ErrorKind::InvalidFilename => "give it a shorter name".to_owned(),
             _ => "choose another place".to_owned(),
         };
-        Self::Unwritable { path: path.to_owned(), source, mend }
+        Self::Unwritable { path: path.to_owned(), source, fix }
     }
 
     pub(super) fn unreadable(path: &Path, source: Error) -> Self {
-        let mend = match source.kind() {
+        let fix = match source.kind() {
             ErrorKind::PermissionDenied => "ask for permission to read it",
             ErrorKind::IsADirectory => "name a file inside it",
             _ => "check the path",
         };
-        Self::Unreadable { path: path.to_owned(), source, mend: mend.to_owned() }
+        Self::Unreadable { path: path.to_owned(), source, fix: fix.to_owned() }
     }
 
     pub(super) fn malformed(path: &Path, kind: &'static str, reason: String) -> Self {
@@ -159,7 +159,7 @@ impl EncodeFailure {
                 width: width.into(),
                 height: height.into(),
                 limit,
-                mend: "write .png, .tif or .exr instead",
+                fix: "write .png, .tif or .exr instead",
             },
             Self::Library(reason) => ImageError::Encode { path, reason },
         }

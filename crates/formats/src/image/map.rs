@@ -31,7 +31,7 @@ pub fn read_map(path: &Path) -> Result<Map, ImageError> {
             width,
             height,
             limit: format!("{MOST_TEXELS} in all"),
-            mend: "scale the map down",
+            fix: "scale the map down",
         },
     })?;
     let fits = |x: f32| (0.0..=BRIGHTEST).contains(&x);

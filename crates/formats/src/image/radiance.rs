@@ -122,9 +122,9 @@ fn read_line(file: &mut impl BufRead, line: &mut [Rgbe]) -> Result<(), String> {
     if first[..2] != [2, 2] || first[2] >= 128 || !BY_CHANNEL.contains(&width) {
         return read_pixels(file, first, line);
     }
-    let told = usize::from(u16::from_be_bytes([first[2], first[3]]));
-    if told != width {
-        return Err(format!("found a length of {told}, expected {width}"));
+    let length = usize::from(u16::from_be_bytes([first[2], first[3]]));
+    if length != width {
+        return Err(format!("found a length of {length}, expected {width}"));
     }
     (0..4).try_for_each(|channel| read_channel(file, channel, line))
 }

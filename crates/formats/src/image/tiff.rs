@@ -44,13 +44,13 @@ fn try_encode(picture: &Picture, display: &Display, metadata: &Metadata) -> Resu
 /// few fields needed are read here. Tyndall does not write BigTIFF.
 pub(super) fn read_metadata(mut file: impl BufRead + Seek, length: u64) -> Result<Metadata, String> {
     let mut order = [0; 4];
-    file.read_exact(&mut order).map_err(ends)?;
-    let mut fields = Fields { file, little: order[0] == b'I' };
+    file.read_exact(&mut order).map_err(read_error)?;
+    let mut fields = Directory { file, little: order[0] == b'I' };
     if (if fields.little { order[2] } else { order[3] }) == 43 {
         return Ok(Metadata::default());
     }
     let directory = fields.u32()?;
-    fields.file.seek(SeekFrom::Start(directory.into())).map_err(ends)?;
+    fields.file.seek(SeekFrom::Start(directory.into())).map_err(read_error)?;
     for _ in 0..fields.u16()? {
         let [tag, kind] = [fields.u16()?, fields.u16()?];
         let [count, place] = [fields.u32()?, fields.u32()?];
@@ -63,9 +63,9 @@ pub(super) fn read_metadata(mut file: impl BufRead + Seek, length: u64) -> Resul
                 "found a description of {count} bytes at {place}, expected it within the file"
             ));
         }
-        fields.file.seek(SeekFrom::Start(place.into())).map_err(ends)?;
+        fields.file.seek(SeekFrom::Start(place.into())).map_err(read_error)?;
         let mut text = vec![0; count as usize];
-        fields.file.read_exact(&mut text).map_err(ends)?;
+        fields.file.read_exact(&mut text).map_err(read_error)?;
         let text = text.split(|&b| b == 0).next().unwrap_or_default();
         // A description that is not our JSON is another program's.
         return Ok(std::str::from_utf8(text).ok().and_then(Metadata::from_json).unwrap_or_default());
@@ -74,27 +74,27 @@ pub(super) fn read_metadata(mut file: impl BufRead + Seek, length: u64) -> Resul
 }
 
 /// Reads consecutive numbers in the file's byte order.
-struct Fields<F> {
+struct Directory<F> {
     file: F,
     little: bool,
 }
 
-impl<F: Read> Fields<F> {
+impl<F: Read> Directory<F> {
     fn u16(&mut self) -> Result<u16, String> {
         let mut bytes = [0; 2];
-        self.file.read_exact(&mut bytes).map_err(ends)?;
+        self.file.read_exact(&mut bytes).map_err(read_error)?;
         Ok(if self.little { u16::from_le_bytes(bytes) } else { u16::from_be_bytes(bytes) })
     }
 
     fn u32(&mut self) -> Result<u32, String> {
         let mut bytes = [0; 4];
-        self.file.read_exact(&mut bytes).map_err(ends)?;
+        self.file.read_exact(&mut bytes).map_err(read_error)?;
         Ok(if self.little { u32::from_le_bytes(bytes) } else { u32::from_be_bytes(bytes) })
     }
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "the signature that `map_err` needs")]
-fn ends(error: std::io::Error) -> String {
+fn read_error(error: std::io::Error) -> String {
     match error.kind() {
         ErrorKind::UnexpectedEof => "the file ends inside its directory".to_owned(),
         _ => error.to_string(),

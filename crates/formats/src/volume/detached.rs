@@ -3,7 +3,7 @@
 use super::error::ReadError;
 use super::fields::numbered_files;
 use super::layout::Layout;
-use super::stream::{Parts, Stream};
+use super::stream::{Concatenated, Stream};
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use tyndall::volume::Voxels;
@@ -52,12 +52,12 @@ pub(super) fn read(
     let voxels = match &paths[..] {
         [path] => open(path, total).and_then(|stream| layout.read(path, stream)),
         _ if layout.text => {
-            let mend = "use one data file, or binary samples";
-            return Err(ReadError::unsupported(header, "text in several data files", mend));
+            let fix = "use one data file, or binary samples";
+            return Err(ReadError::unsupported(header, "text in several data files", fix));
         }
         _ => {
             let each = total / paths.len() as u64;
-            let parts = Parts::new(paths, each, |path: &Path| open(path, each));
+            let parts = Concatenated::new(paths, each, |path: &Path| open(path, each));
             let reader = Box::new(BufReader::with_capacity(1 << 16, parts));
             layout.read(header, Stream { reader, available: None })
         }

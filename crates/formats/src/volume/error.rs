@@ -54,14 +54,14 @@ pub enum ReadError {
         expected: String,
     },
     /// A valid file of a variant that is not supported.
-    #[error("{}: {} is not supported; {mend}", path_name(.path), sentence(.what))]
+    #[error("{}: {} is not supported; {fix}", path_name(.path), sentence(.what))]
     Unsupported {
         /// The file.
         path: PathBuf,
         /// The feature.
         what: String,
         /// How to get around it.
-        mend: String,
+        fix: String,
     },
     /// Fewer samples than the header states.
     #[error("{}: {found} bytes of samples, expected {expected} according to the header; the file is cut short or its header is wrong", path_name(.path))]
@@ -147,8 +147,8 @@ impl ReadError {
     }
 
     /// Something valid that is not supported.
-    pub(super) fn unsupported(path: &Path, what: impl Into<String>, mend: impl Into<String>) -> Self {
-        Self::Unsupported { path: path.into(), what: what.into(), mend: mend.into() }
+    pub(super) fn unsupported(path: &Path, what: impl Into<String>, fix: impl Into<String>) -> Self {
+        Self::Unsupported { path: path.into(), what: what.into(), fix: fix.into() }
     }
 
     /// An I/O error; if it wraps a [`ReadError`], that one is returned.

@@ -2,7 +2,7 @@
 
 use super::error::ReadError;
 use super::sample_type::{Endian, SampleType};
-use super::stream::{Every, Stream, fill};
+use super::stream::{KeepEvery, Stream, fill};
 use crate::memory::available;
 use bytemuck::Pod;
 use std::io::{self, BufRead, BufReader, Read};
@@ -117,7 +117,7 @@ impl Layout {
             slower /= n;
             // On the slowest axis only the first block is kept, so reading stops after it: no need to skip.
             if axis != Axis::Space && n > 1 && slower > 1 {
-                reader = Box::new(BufReader::new(Every::new(reader, inner, inner * n)));
+                reader = Box::new(BufReader::new(KeepEvery::new(reader, inner, inner * n)));
             }
             if axis == Axis::Space {
                 inner *= n;
@@ -192,7 +192,7 @@ use of_type;
 /// Why reading the samples stopped early.
 enum Stop {
     Short { found: u64, expected: u64 },
-    Trouble(io::Error),
+    Io(io::Error),
     Memory { needed: u64 },
 }
 
@@ -204,7 +204,7 @@ impl Stop {
             Self::Memory { needed } => {
                 ReadError::Memory { path, needed, available: available().unwrap_or(0) }
             }
-            Self::Trouble(error) => match error.downcast::<ReadError>() {
+            Self::Io(error) => match error.downcast::<ReadError>() {
                 Ok(inner) => inner,
                 Err(e) if e.raw_os_error().is_some() => ReadError::Io { path, source: e },
                 Err(e) => ReadError::Damaged { path, message: e.to_string() },
@@ -225,7 +225,7 @@ fn read_vec<T: Pod>(reader: &mut dyn Read, count: usize, all_there: bool) -> Res
         let step = (count - have).min(have.max(first));
         data.try_reserve_exact(step).map_err(|_| Stop::Memory { needed: expected })?;
         data.resize(have + step, T::zeroed());
-        let got = fill(reader, bytemuck::cast_slice_mut(&mut data[have..])).map_err(Stop::Trouble)?;
+        let got = fill(reader, bytemuck::cast_slice_mut(&mut data[have..])).map_err(Stop::Io)?;
         if got < step * size {
             return Err(Stop::Short { found: (have * size + got) as u64, expected });
         }
@@ -235,7 +235,7 @@ fn read_vec<T: Pod>(reader: &mut dyn Read, count: usize, all_there: bool) -> Res
 
 /// Lets a decoder reach the end of its stream, where it verifies the checksum.
 fn check_end(path: &Path, reader: &mut dyn BufRead) -> Result<(), ReadError> {
-    reader.fill_buf().map(|_| ()).map_err(|error| Stop::Trouble(error).at(path))
+    reader.fill_buf().map(|_| ()).map_err(|error| Stop::Io(error).at(path))
 }
 
 /// Reverses the byte order of every sample.

@@ -63,7 +63,7 @@ enum Kind {
 /// The kind by the first bytes; by the name for files that have no signature there: the samples of a NIfTI
 /// pair, and MetaImage headers that begin unusually.
 fn kind(path: &Path) -> Result<Option<Kind>, ReadError> {
-    let head = stream::fill_head(path)?;
+    let head = stream::first_bytes(path)?;
     if head.starts_with(b"NRRD00") {
         return Ok(Some(Kind::Nrrd));
     }

@@ -23,7 +23,7 @@ pub(super) fn grid(
     }
     for axis in 0..3 {
         if steps[axis].is_none() {
-            steps[axis] = Some(across(steps[(axis + 1) % 3], steps[(axis + 2) % 3]));
+            steps[axis] = Some(perpendicular(steps[(axis + 1) % 3], steps[(axis + 2) % 3]));
         }
     }
     let steps = steps.map(Option::unwrap_or_default);
@@ -35,7 +35,7 @@ pub(super) fn grid(
 }
 
 /// A unit vector perpendicular to those given and, where that leaves a choice, to a world axis.
-fn across(next: Option<Vector>, after: Option<Vector>) -> Vector {
+fn perpendicular(next: Option<Vector>, after: Option<Vector>) -> Vector {
     match (next, after) {
         (Some(a), Some(b)) => normalised(cross(a, b)),
         (Some(v), None) | (None, Some(v)) => {

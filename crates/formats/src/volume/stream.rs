@@ -65,7 +65,7 @@ pub(super) fn open(path: &Path) -> Result<BufReader<File>, ReadError> {
 }
 
 /// The first 1024 bytes of a file, decompressed if it is gzip; fewer if it is shorter.
-pub(super) fn fill_head(path: &Path) -> Result<Vec<u8>, ReadError> {
+pub(super) fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     let trouble = |source| ReadError::io(path, source);
     let mut file = open(path)?;
     let gzip = file.fill_buf().map_err(trouble)?.starts_with(&GZIP);
@@ -152,14 +152,14 @@ pub(super) fn fill(reader: &mut dyn Read, mut out: &mut [u8]) -> io::Result<usiz
 }
 
 /// Keeps the first `keep` of every `period` bytes: the first of several interleaved channels.
-pub(super) struct Every<R> {
+pub(super) struct KeepEvery<R> {
     inner: R,
     keep: usize,
     period: usize,
     position: usize,
 }
 
-impl<R: BufRead> Every<R> {
+impl<R: BufRead> KeepEvery<R> {
     /// Requires `0 < keep <= period`.
     pub fn new(inner: R, keep: usize, period: usize) -> Self {
         assert!(0 < keep && keep <= period, "keep {keep} of {period}");
@@ -167,7 +167,7 @@ impl<R: BufRead> Every<R> {
     }
 }
 
-impl<R: BufRead> Read for Every<R> {
+impl<R: BufRead> Read for KeepEvery<R> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         let mut written = 0;
         while written == 0 && !out.is_empty() {
@@ -199,21 +199,21 @@ impl<R: BufRead> Read for Every<R> {
 }
 
 /// Several files read one after the other, the same number of bytes from each; each is opened when reached.
-pub(super) struct Parts<F> {
+pub(super) struct Concatenated<F> {
     left: VecDeque<PathBuf>,
     bytes_each: u64,
     open: F,
     current: Option<(PathBuf, Take<Box<dyn BufRead>>)>,
 }
 
-impl<F: FnMut(&Path) -> Result<Stream<'static>, ReadError>> Parts<F> {
+impl<F: FnMut(&Path) -> Result<Stream<'static>, ReadError>> Concatenated<F> {
     /// `open` returns the bytes of a file's samples.
     pub fn new(files: Vec<PathBuf>, bytes_each: u64, open: F) -> Self {
         Self { left: files.into(), bytes_each, open, current: None }
     }
 }
 
-impl<F: FnMut(&Path) -> Result<Stream<'static>, ReadError>> Read for Parts<F> {
+impl<F: FnMut(&Path) -> Result<Stream<'static>, ReadError>> Read for Concatenated<F> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         loop {
             if let Some((path, reader)) = &mut self.current {
@@ -245,7 +245,7 @@ mod tests {
         for capacity in [1, 4, 5, 64] {
             let mut kept = Vec::new();
             let inner = BufReader::with_capacity(capacity, &input[..]);
-            Every::new(inner, 2, 6).read_to_end(&mut kept).unwrap();
+            KeepEvery::new(inner, 2, 6).read_to_end(&mut kept).unwrap();
             assert_eq!(kept, expected, "buffer of {capacity}");
         }
     }

@@ -28,10 +28,10 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
     let channels = fields.one(&["ElementNumberOfChannels"], "a number of at least 1")?.unwrap_or(1);
     let mut axes = vec![(channels, Axis::Channel)];
     axes.extend(sizes.iter().enumerate().map(|(i, &n)| (n, if i < 3 { Axis::Space } else { Axis::Time })));
-    let text = !yes(&fields, &["BinaryData"], true)?;
+    let text = !parse_bool(&fields, &["BinaryData"], true)?;
     let layout = Layout::new(path, "DimSize", axes, sample_type(&fields)?, endian(&fields)?)?;
     let layout = Layout { text, ..layout };
-    let coding = if yes(&fields, &["CompressedData"], false)? { Coding::Zlib } else { Coding::Raw };
+    let coding = if parse_bool(&fields, &["CompressedData"], false)? { Coding::Zlib } else { Coding::Raw };
     let start = match fields.one::<i64>(&["HeaderSize"], "a number of bytes, or -1")? {
         None | Some(0) => None,
         Some(-1) => Some(Start::AtEnd),
@@ -114,7 +114,7 @@ fn number(fields: &Fields, key: &str, default: f64) -> Result<f64, ReadError> {
 }
 
 /// True or False; only the first letter counts, as in MetaIO.
-fn yes(fields: &Fields, keys: &[&str], default: bool) -> Result<bool, ReadError> {
+fn parse_bool(fields: &Fields, keys: &[&str], default: bool) -> Result<bool, ReadError> {
     match fields.get(keys).map(|text| (text, text.chars().next())) {
         None => Ok(default),
         Some((_, Some('T' | 't' | 'Y' | 'y' | '1'))) => Ok(true),
@@ -124,7 +124,7 @@ fn yes(fields: &Fields, keys: &[&str], default: bool) -> Result<bool, ReadError>
 }
 
 fn endian(fields: &Fields) -> Result<Endian, ReadError> {
-    let big = yes(fields, &["BinaryDataByteOrderMSB", "ElementByteOrderMSB"], false)?;
+    let big = parse_bool(fields, &["BinaryDataByteOrderMSB", "ElementByteOrderMSB"], false)?;
     Ok(if big { Endian::Big } else { Endian::Little })
 }
 
@@ -143,8 +143,8 @@ fn sample_type(fields: &Fields) -> Result<SampleType, ReadError> {
         "MET_FLOAT" => SampleType::F32,
         "MET_DOUBLE" => SampleType::F64,
         "MET_LONG_LONG" | "MET_ULONG_LONG" => {
-            let mend = "convert the samples to MET_INT or MET_FLOAT, e.g. with SimpleITK's `Cast`";
-            return Err(ReadError::unsupported(fields.path, format!("ElementType {name}"), mend));
+            let fix = "convert the samples to MET_INT or MET_FLOAT, e.g. with SimpleITK's `Cast`";
+            return Err(ReadError::unsupported(fields.path, format!("ElementType {name}"), fix));
         }
         _ => return Err(ReadError::header(fields.path, "ElementType", name, expected)),
     })

@@ -109,11 +109,11 @@ impl Header {
             b"n+1\0" => Storage::Single,
             b"ni1\0" => Storage::Pair,
             b"\0\0\0\0" => {
-                let mend = "convert it to NIfTI: Analyze does not say where left and right are";
+                let fix = "convert it to NIfTI: Analyze does not say where left and right are";
                 return Err(ReadError::unsupported(
                     path,
                     "Analyze 7.5 (a header without the NIfTI mark)",
-                    mend,
+                    fix,
                 ));
             }
             other => return Err(wrong_mark(path, other, "n+1 or ni1")),

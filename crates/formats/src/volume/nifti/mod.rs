@@ -21,10 +21,10 @@ use tyndall::volume::ValueMap;
 
 /// Reads a `.nii`, `.hdr` or `.img` file, also compressed with gzip.
 pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
-    let header_path = if has_extension(path, "img") { beside(path, "hdr")? } else { path.to_path_buf() };
+    let header_path = if has_extension(path, "img") { other_file(path, "hdr")? } else { path.to_path_buf() };
     let path = header_path.as_path();
     let mut notes = Vec::new();
-    let header = Header::parse(path, &stream::fill_head(path)?)?;
+    let header = Header::parse(path, &stream::first_bytes(path)?)?;
     let grid = orientation::grid(path, &header, &mut notes)?;
     let (sample, components) = sample_type(path, header.datatype)?;
     let [x, y, z, times, channels @ ..] = header.dims;
@@ -40,7 +40,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
     };
     let voxels = match header.storage {
         Storage::Single => read_from(path)?,
-        Storage::Pair => read_from(&beside(path, "img")?).map_err(|error| error.in_data_file(path))?,
+        Storage::Pair => read_from(&other_file(path, "img")?).map_err(|error| error.in_data_file(path))?,
     };
     let (channels, times) = (layout.count(Axis::Channel), layout.count(Axis::Time));
     Parsed { grid, voxels, values, channels, times, notes }.load(path)
@@ -82,8 +82,8 @@ fn sample_type(path: &Path, code: i32) -> Result<(SampleType, usize), ReadError>
             ));
         }
     };
-    let mend = "convert the samples to float32, e.g. with nibabel's `set_data_dtype`";
-    Err(ReadError::unsupported(path, format!("datatype {code} ({what})"), mend))
+    let fix = "convert the samples to float32, e.g. with nibabel's `set_data_dtype`";
+    Err(ReadError::unsupported(path, format!("datatype {code} ({what})"), fix))
 }
 
 /// Slope and intercept; a slope that is zero or not finite means no scaling.
@@ -116,7 +116,7 @@ fn split(path: &Path) -> (PathBuf, String) {
 
 /// The other file of a pair: the same name with another extension. If this file is compressed, a compressed
 /// one is tried first.
-fn beside(path: &Path, extension: &str) -> Result<PathBuf, ReadError> {
+fn other_file(path: &Path, extension: &str) -> Result<PathBuf, ReadError> {
     let stem = split(path).0;
     let upper = extension.to_uppercase();
     let mut endings =
@@ -134,6 +134,6 @@ fn beside(path: &Path, extension: &str) -> Result<PathBuf, ReadError> {
             return Ok(candidate);
         }
     }
-    let expected = format!("{}.{extension} or .{extension}.gz beside it", path_name(&stem));
+    let expected = format!("{}.{extension} or .{extension}.gz other_file it", path_name(&stem));
     Err(ReadError::missing(path, "the other file of the pair", &expected))
 }

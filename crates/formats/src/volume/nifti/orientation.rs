@@ -85,7 +85,8 @@ fn voxel_sizes(header: &Header) -> [f64; 3] {
 
 /// Whether any corner of the box differs by more than a tenth of a voxel.
 fn differ(a: &Rows, b: &Rows, dims: [usize; 3]) -> bool {
-    let voxel = (0..3).map(|i| a[i][0].hypot(a[i][1]).hypot(a[i][2])).fold(f64::INFINITY, f64::min);
+    // A column is the step between voxels along one axis.
+    let voxel = (0..3).map(|j| a[0][j].hypot(a[1][j]).hypot(a[2][j])).fold(f64::INFINITY, f64::min);
     (0..3).any(|i| {
         let far: f64 = (0..3).map(|j| (a[i][j] - b[i][j]).abs() * (dims[j] as f64 - 1.0)).sum();
         far + (a[i][3] - b[i][3]).abs() > 0.1 * voxel

@@ -115,8 +115,8 @@ fn encoding(fields: &Fields) -> Result<(Coding, bool), ReadError> {
         "gzip" | "gz" => (Coding::Gzip, false),
         "bzip2" | "bz2" => (Coding::Bzip2, false),
         "hex" | "zrl" => {
-            let mend = format!("convert the file to {names}, e.g. with `unu save -f nrrd -e gzip`");
-            return Err(ReadError::unsupported(fields.path, format!("encoding `{name}`"), mend));
+            let fix = format!("convert the file to {names}, e.g. with `unu save -f nrrd -e gzip`");
+            return Err(ReadError::unsupported(fields.path, format!("encoding `{name}`"), fix));
         }
         _ => return Err(ReadError::header(fields.path, "encoding", &name, names)),
     })
@@ -157,8 +157,8 @@ fn sample_type(fields: &Fields) -> Result<SampleType, ReadError> {
         | "uint64"
         | "uint64_t"
         | "block" => {
-            let mend = format!("convert the samples to {expected}, e.g. with `unu convert -t int32`");
-            return Err(ReadError::unsupported(fields.path, format!("type `{name}`"), mend));
+            let fix = format!("convert the samples to {expected}, e.g. with `unu convert -t int32`");
+            return Err(ReadError::unsupported(fields.path, format!("type `{name}`"), fix));
         }
         _ => return Err(ReadError::header(fields.path, "type", &name, expected)),
     })

@@ -91,7 +91,7 @@ impl Shape {
             let wrong = || ReadError::header(fields.path, "space origin", text, &expected);
             let vectors = vectors(text).ok_or_else(wrong)?;
             let [Some(vector)] = &vectors[..] else { return Err(wrong()) };
-            origin = self.space.bring(vector).ok_or_else(wrong)?;
+            origin = self.space.to_world(vector).ok_or_else(wrong)?;
         }
         placement::grid(fields.path, dims, steps, origin, self.space.space)
     }
@@ -99,7 +99,7 @@ impl Shape {
 
 impl World {
     /// Converts a vector of the file to our world; missing components are zero.
-    fn bring(&self, vector: &[f64]) -> Option<Vector> {
+    fn to_world(&self, vector: &[f64]) -> Option<Vector> {
         (vector.len() == self.dimension)
             .then(|| std::array::from_fn(|i| self.signs[i] * vector.get(i).copied().unwrap_or(0.0)))
     }
@@ -154,8 +154,8 @@ fn directions(
     let expected = format!("{dimension} vectors of {} finite numbers, or `none`", space.dimension);
     let wrong = || ReadError::header(fields.path, "space directions", text, &expected);
     let found = vectors(text).filter(|vectors| vectors.len() == dimension).ok_or_else(wrong)?;
-    let bring = |v: Option<Vec<f64>>| v.map(|v| space.bring(&v).ok_or_else(wrong)).transpose();
-    found.into_iter().map(bring).collect::<Result<_, _>>().map(Some)
+    let to_world = |v: Option<Vec<f64>>| v.map(|v| space.to_world(&v).ok_or_else(wrong)).transpose();
+    found.into_iter().map(to_world).collect::<Result<_, _>>().map(Some)
 }
 
 /// Vectors such as `(1,0,0) none (0, 2, 0)`.

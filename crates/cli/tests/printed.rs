@@ -72,12 +72,13 @@ fn non_finite_samples_are_counted_and_read_as_the_ends_of_the_range() {
         let head =
             format!("NRRD0004\ntype: {kind}\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nendian: little\n\n");
         folder.put("a.nrrd", [head.as_bytes(), &samples].concat());
-        let told = json(&run(&folder, &["info", "../a.nrrd", "--json"]));
-        assert_eq!(told["type"], name, "{told}");
-        assert_eq!(told["non_finite"], 3, "{told}");
-        assert_eq!(told["value_range"], serde_json::json!([2.0, 4.0]), "{told}");
-        let counts: Vec<u64> = serde_json::from_value(told["histogram"]["counts"].clone()).expect("numbers");
-        assert_eq!((counts[0], counts[255], counts.iter().sum::<u64>()), (4, 2, 8), "{told}");
+        let report = json(&run(&folder, &["info", "../a.nrrd", "--json"]));
+        assert_eq!(report["type"], name, "{report}");
+        assert_eq!(report["non_finite"], 3, "{report}");
+        assert_eq!(report["value_range"], serde_json::json!([2.0, 4.0]), "{report}");
+        let counts: Vec<u64> =
+            serde_json::from_value(report["histogram"]["counts"].clone()).expect("numbers");
+        assert_eq!((counts[0], counts[255], counts.iter().sum::<u64>()), (4, 2, 8), "{report}");
         let text = String::from_utf8(run(&folder, &["info", "../a.nrrd"])).expect("UTF-8");
         assert!(text.contains("not finite 3 samples; NaN is read as the smallest value"), "{text}");
         assert!(text.contains("values     2 to 4;"), "{text}");
@@ -119,7 +120,7 @@ fn what_the_loader_understood_is_printed() {
     let samples = [-1000_i16, 0, 1, 2, 3, 500].map(i16::to_le_bytes).concat();
     folder.put("a.nrrd", [head.as_bytes(), &samples].concat());
     folder.put("scene.json", "{ \"volume\": { \"path\": \"a.nrrd\" }, \"film\": { \"size\": [8, 8] } }");
-    let told = json(&run(&folder, &["info", "../a.nrrd", "--json"]));
+    let report = json(&run(&folder, &["info", "../a.nrrd", "--json"]));
     for (key, value) in [
         ("dims", serde_json::json!([3, 2, 1])),
         ("type", serde_json::json!("i16")),
@@ -131,15 +132,15 @@ fn what_the_loader_understood_is_printed() {
         ("channels", serde_json::json!(1)),
         ("times", serde_json::json!(1)),
     ] {
-        assert_eq!(told[key], value, "{key}");
+        assert_eq!(report[key], value, "{key}");
     }
-    assert_eq!(told["robust_range"].as_array().map(Vec::len), Some(2), "{told}");
-    assert_eq!(told["histogram"]["range"], told["value_range"]);
-    let counts = told["histogram"]["counts"].as_array().expect("counts");
+    assert_eq!(report["robust_range"].as_array().map(Vec::len), Some(2), "{report}");
+    assert_eq!(report["histogram"]["range"], report["value_range"]);
+    let counts = report["histogram"]["counts"].as_array().expect("counts");
     assert_eq!(counts.iter().filter_map(serde_json::Value::as_u64).sum::<u64>(), 6);
-    assert_eq!(json(&run(&folder, &["info", "../scene.json", "--json"])), told);
+    assert_eq!(json(&run(&folder, &["info", "../scene.json", "--json"])), report);
     run(&folder, &["render", "../scene.json", "-o", "a.exr", "--samples", "1"]);
-    assert_eq!(json(&run(&folder, &["info", "a.exr", "--json"])), told);
+    assert_eq!(json(&run(&folder, &["info", "a.exr", "--json"])), report);
     let text = String::from_utf8(run(&folder, &["info", "../a.nrrd"])).expect("UTF-8");
     assert!(text.contains("3 x 2 x 1 of i16") && text.contains("-1000 to 500"), "{text}");
 }
