@@ -52,7 +52,7 @@ impl Picture {
     }
 }
 
-/// Signed difference of two estimates in standard errors of that difference; infinite if either is NaN.
+/// Signed difference of two estimates in standard errors of that difference; infinite if either is not finite.
 fn z(image: (f64, f64), reference: (f64, f64)) -> f64 {
     // Both means were rounded; use the brighter one's rounding for both.
     let rounding = ROUNDING * image.0.abs().max(reference.0.abs());

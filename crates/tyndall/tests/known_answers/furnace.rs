@@ -81,7 +81,7 @@ fn glossy_surfaces_make_no_light() {
     }
 }
 
-/// The same with the sky split into two lights, which are chosen by power and which an escaping ray both hits.
+/// The same with the sky split into two lights, chosen by power; an escaping ray hits both.
 #[test]
 fn several_lights_add_up() {
     let half = Light::Environment(Environment::constant(Rgb::splat(0.25), true));

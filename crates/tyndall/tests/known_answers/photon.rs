@@ -23,7 +23,7 @@ use tyndall_testing::Mean;
 
 /// Samples per pixel of a `path` picture.
 const SAMPLES: u32 = 32;
-/// Relative change that blur may cause in a picture's mean; the RMS change of blocks, which blur mixes, may be twice it.
+/// Relative change that blur may cause in a picture's mean. The RMS change of blocks, which blur mixes, may be twice.
 const BIAS: f64 = 0.01;
 
 /// Settings of most tests.

@@ -19,7 +19,7 @@ pub struct Estimate {
     pub blocks: Vec<Mean>,
 }
 
-/// Means of square blocks of `edge` pixels' edge length; the channels are interleaved.
+/// Means of blocks of `edge` x `edge` pixels; the channels are interleaved.
 fn block_means(image: &Image, edge: usize) -> Vec<f64> {
     let row = PIXELS / edge;
     let mut means = vec![0.0; 3 * row * row];
@@ -75,13 +75,13 @@ impl Estimate {
         mean.max(0.0).sqrt() / expected.whole[channel].mean()
     }
 
-    /// Asserts little noise, a relative error of at most `bias` as a whole, and at most twice that RMS over blocks.
+    /// Asserts low noise and relative errors of at most `bias` (whole picture) and twice `bias` (RMS of blocks).
     #[track_caller]
     pub fn assert_near(&self, expected: &Self, bias: f64, name: &str) {
         self.assert_within(expected, [bias, 2.0 * bias], name);
     }
 
-    /// Asserts little noise, and at most these relative errors: of the whole, and RMS of the blocks.
+    /// Asserts low noise and relative errors of at most `bias` (whole picture) and `of_blocks` (RMS of blocks).
     #[track_caller]
     pub fn assert_within(&self, expected: &Self, [bias, of_blocks]: [f64; 2], name: &str) {
         for channel in 0..3 {
