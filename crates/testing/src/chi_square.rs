@@ -57,7 +57,7 @@ impl Default for ChiSquare {
 impl ChiSquare {
     /// The default test, as one of `tests` that share one significance.
     #[must_use]
-    pub fn of(tests: usize) -> Self {
+    pub fn among(tests: usize) -> Self {
         Self { tests, ..Self::default() }
     }
 

@@ -105,7 +105,7 @@ impl ZTest {
 
     /// The same test, as one of `tests` that share one significance.
     #[must_use]
-    pub const fn of(self, tests: usize) -> Self {
+    pub const fn among(self, tests: usize) -> Self {
         Self { tests, ..self }
     }
 
@@ -245,7 +245,7 @@ mod tests {
         assert!(!ZTest::new(0.95, 1e-4, 1.0).passes());
         // Three standard errors are too many for one test, and unremarkable among a thousand.
         let off = ZTest::new(1.03, 1e-4, 1.0);
-        assert!(!off.passes() && off.of(1000).passes());
+        assert!(!off.passes() && off.among(1000).passes());
     }
 
     #[test]

@@ -48,7 +48,7 @@ fn cosine_pdf(w: [f32; 3]) -> f64 {
 fn peaked_lobes_pass_in_any_direction() {
     let cases = [0.5_f32, -0.8, 0.95, 0.99].map(|g| [POLE, OBLIQUE].map(|axis| (g, axis)));
     for (g, axis) in cases.into_iter().flatten() {
-        let test = ChiSquare::of(8);
+        let test = ChiSquare::among(8);
         test.directions(henyey_greenstein(g, axis), henyey_greenstein_pdf(f64::from(g), axis)).assert();
     }
 }
@@ -61,7 +61,7 @@ fn a_density_in_single_precision_passes() {
             let square = 1.0 + g * g - 2.0 * g * cos_theta;
             f64::from((1.0 - g * g) / (2.0 * TAU * square * square.sqrt()))
         };
-        ChiSquare::of(2).directions(henyey_greenstein(g, OBLIQUE), pdf).assert();
+        ChiSquare::among(2).directions(henyey_greenstein(g, OBLIQUE), pdf).assert();
     }
 }
 
@@ -191,10 +191,11 @@ fn lobes_that_end_in_a_jump_or_a_kink_pass_in_any_direction() {
 
         let even =
             |w: [f32; 3]| if along(w) > f64::from(edge) { 0.5 / PI / (1.0 - f64::from(edge)) } else { 0.0 };
-        let cone = ChiSquare::of(40).directions(|[a, b]: [f32; 2]| about(1.0 - a * (1.0 - edge), b), even);
+        let cone = ChiSquare::among(40).directions(|[a, b]: [f32; 2]| about(1.0 - a * (1.0 - edge), b), even);
         assert!(cone.passes(), "cone of {edge} about {axis:?}: {cone}");
         let cosine = |w: [f32; 3]| along(w).max(0.0) / PI;
-        let hemisphere = ChiSquare::of(40).directions(|[a, b]: [f32; 2]| about((1.0 - a).sqrt(), b), cosine);
+        let hemisphere =
+            ChiSquare::among(40).directions(|[a, b]: [f32; 2]| about((1.0 - a).sqrt(), b), cosine);
         assert!(hemisphere.passes(), "hemisphere about {axis:?}: {hemisphere}");
     }
 }

@@ -154,7 +154,7 @@ fn directions_from_outside_are_uniform_over_the_box() {
                 let ray = Ray::new(from, Vec3::from_array(w));
                 if hits(&grid, &ray) { 1.0 / f64::from(flux) } else { 0.0 }
             };
-            let test = ChiSquare { rows: 32, columns: 64, ..ChiSquare::of(3 * positions.len()) };
+            let test = ChiSquare { rows: 32, columns: 64, ..ChiSquare::among(3 * positions.len()) };
             let fit = test.directions(sample, pdf);
             assert!(fit.passes(), "{name}, from {position:?}: {fit}");
         }
@@ -164,7 +164,7 @@ fn directions_from_outside_are_uniform_over_the_box() {
 /// Lights on faces, edges and corners, in their planes and lines, a hair away from them, and far away: paths start at
 /// finite positions with finite flux, and those of point lights outside hit the box.
 #[test]
-fn no_place_of_a_light_is_too_hard() {
+fn light_positions_that_are_hard_are_handled() {
     let mut started = 0;
     for (name, grid) in grids() {
         let box_ = Enclosure::new(&grid);

@@ -18,7 +18,7 @@ use tyndall::transfer::{Optics, Point};
 
 const MARCH: Settings = Settings { step: 0.5, light_samples: 3 };
 
-/// Glowing, reflecting and purely scattering matter with empty space between, in 8^3 blocks and smaller.
+/// Glowing, reflecting and purely scattering matter with empty space between, in blocks of 9 x 7 x 11 voxels.
 fn scene(majorant_cell: usize) -> Scene {
     let value = |p: [usize; 3]| {
         let block = (p[0] / 9 + p[1] / 7 + p[2] / 11) % 4;

@@ -39,7 +39,8 @@ fn directions_follow_their_density() {
         let pdf = |w: [f32; 3]| {
             light.passed(&Ray::new(from, Vec3::from_array(w))).map_or(0.0, |p| f64::from(p.pdf))
         };
-        let fit = ChiSquare { rows: 32, columns: 64, ..ChiSquare::of(lights.len()) }.directions(sample, pdf);
+        let fit =
+            ChiSquare { rows: 32, columns: 64, ..ChiSquare::among(lights.len()) }.directions(sample, pdf);
         assert!(fit.passes(), "{name}: {fit}");
     }
 }

@@ -217,7 +217,7 @@ fn black_channels_and_several_lights() {
 
 /// Each path carries its share of the light, even one that misses: more paths do not change the mean.
 #[test]
-fn the_number_of_photons_is_no_brightness() {
+fn brightness_does_not_depend_on_the_number_of_photons() {
     let setup = Setup { density: 0.3, ..sunny(0.9) };
     let scene = seen(setup, ASIDE, Vec3::ZERO, 1.6);
     let with = |count| photons(&scene, PhotonSettings { photons: count, ..PHOTONS });

@@ -126,7 +126,7 @@ fn collisions_are_distributed_as_the_optical_depth_says() {
 
 /// Distances sampled by inverting a march follow its distribution, and each collision reports the pdf of its distance.
 #[test]
-fn marched_distances_have_the_density_that_they_tell() {
+fn marched_distances_have_the_density_that_they_report() {
     let scene = gaussian();
     let medium = &*scene.medium;
     let ray = Ray::new(Vec3::new(0.03, 0.0, 2.0), Vec3::new(0.02, 0.05, -1.0).normalize());

@@ -102,7 +102,7 @@ fn graph(src: &Path, folder: &Path) -> Graph {
 }
 
 /// A cycle of imports, if there is one.
-fn circle(graph: &Graph) -> Option<Vec<String>> {
+fn cycle(graph: &Graph) -> Option<Vec<String>> {
     fn visit(
         graph: &Graph,
         at: &str,
@@ -127,29 +127,27 @@ fn circle(graph: &Graph) -> Option<Vec<String>> {
 #[test]
 fn imports_between_files_of_a_folder_run_one_way() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let (mut imports, mut circles) = (0, Vec::new());
+    let (mut imports, mut cycles) = (0, Vec::new());
     for entry in fs::read_dir(&crates).expect("the crates") {
         let src = entry.expect("an entry").path().join("src");
         for folder in folders(&src) {
             let graph = graph(&src, &folder);
             imports += graph.values().map(BTreeSet::len).sum::<usize>();
-            circles.extend(
-                circle(&graph).map(|circle| format!("{}: {}", folder.display(), circle.join(" -> "))),
-            );
+            cycles.extend(cycle(&graph).map(|cycle| format!("{}: {}", folder.display(), cycle.join(" -> "))));
         }
     }
-    assert!(circles.is_empty(), "{circles:#?}");
+    assert!(cycles.is_empty(), "{cycles:#?}");
     assert!(imports > 200, "only {imports} imports were found: the test checks nothing");
 }
 
 #[test]
-fn circles_are_found_and_names_in_braces_are_read() {
+fn cycles_are_found_and_names_in_braces_are_read() {
     let of = |pairs: &[(&str, &[&str])]| -> Graph {
         let set = |names: &[&str]| names.iter().map(ToString::to_string).collect();
         pairs.iter().map(|(name, used)| (name.to_string(), set(used))).collect()
     };
-    assert_eq!(circle(&of(&[("a", &["b"]), ("b", &["c"]), ("c", &[])])), None);
-    let found = circle(&of(&[("a", &["b"]), ("b", &["c"]), ("c", &["b"])])).expect("a circle");
+    assert_eq!(cycle(&of(&[("a", &["b"]), ("b", &["c"]), ("c", &[])])), None);
+    let found = cycle(&of(&[("a", &["b"]), ("b", &["c"]), ("c", &["b"])])).expect("a cycle");
     assert_eq!(found, ["b", "c"]);
     let names = named("use super::{a, b::{C, D}, e::F};\nuse super::g::H;", "super::");
     assert_eq!(names.into_iter().collect::<Vec<_>>(), ["a", "b", "e", "g"]);
