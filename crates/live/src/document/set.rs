@@ -11,8 +11,8 @@ use tyndall::message::{excerpt, quoted};
 /// Sets one key of a document: `medium.density=0.3`, `lights.0.radiance=[1,2,3]`.
 ///
 /// PATH is keys and list indices separated by dots; missing tables and lists on the way are created, and the index
-/// after a list's last one appends an item. VALUE is JSON, or else text; it replaces the old value, and null removes it.
-/// Types and alternatives are replaced as in [`apply`](super::apply).
+/// after a list's last one appends an item. VALUE is JSON, or else text; it replaces the old value, and null removes
+/// it. Types and alternatives are replaced as in [`apply`](super::apply).
 ///
 /// # Errors
 /// [`DocumentError::Content`] if the assignment has no `=`, or its path leads nowhere; the document is then unchanged.
