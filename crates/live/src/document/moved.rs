@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn values_at_both_paths_are_an_error() {
+    fn both_places_at_once_are_an_error() {
         let both = json!({ "medium": { "majorant_cell": 4 }, "render": { "path": { "majorant_cell": 4 } } });
         let mut value = both.clone();
         let error = move_old_keys(&mut value).unwrap_err();
