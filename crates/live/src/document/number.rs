@@ -4,7 +4,7 @@ use serde_json::{Number, Value};
 
 use tyndall::math::cast;
 
-/// Replaces each number that is a single-precision one by the shortest decimal that reads back as the same:
+/// Replaces each number that single precision holds exactly by the shortest decimal that parses to the same number:
 /// 0.04 instead of 0.03999999910593033.
 pub(super) fn shorten(value: &mut Value) {
     match value {
@@ -21,8 +21,8 @@ pub(super) fn shorten(value: &mut Value) {
 
 /// The shortest decimal of a number that single precision holds exactly.
 ///
-/// A decimal may round to double and then to single precision otherwise than to single precision at once (7.038531e-26
-/// does); such a number keeps its long notation.
+/// Rounding a decimal to double and then to single precision may differ from rounding it directly to single precision
+/// (as for 7.038531e-26); such a number keeps its long notation.
 fn shortest(exact: f64) -> Option<Number> {
     let single = cast::single(exact);
     let decimal = single.to_string().parse().ok()?;
