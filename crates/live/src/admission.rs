@@ -17,21 +17,21 @@ pub(crate) fn film(document: &Document, at: &str) -> Result<(), LiveError> {
         what: format!("{} x {} pixels need", size[0], size[1]),
         needed,
         available,
-        mend: "a smaller picture",
+        fix: "a smaller picture",
     })
 }
 
 /// Refuses a scene whose method may need more memory than is available; `at` begins the message.
 pub(crate) fn method(scene: &Scene, at: &str) -> Result<(), LiveError> {
     let method = method_of(&scene.render.method);
-    let Some(MemoryNeed { bytes, key, what, mend }) = method.memory(scene) else { return Ok(()) };
+    let Some(MemoryNeed { bytes, key, what, fix }) = method.memory(scene) else { return Ok(()) };
     admit(bytes, |needed, available| LiveError::Memory {
         at: at.to_owned(),
         key: format!("render.{}.{key}", method.table()),
         what: format!("{what} may need"),
         needed,
         available,
-        mend,
+        fix,
     })
 }
 

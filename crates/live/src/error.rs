@@ -48,7 +48,7 @@ pub enum LiveError {
     },
     /// More memory would be needed than is free.
     #[error(
-        "{at}: {key}: {what} {} MiB, but {} MiB are free; expected {mend}",
+        "{at}: {key}: {what} {} MiB, but {} MiB are free; expected {fix}",
         .needed >> 20,
         .available >> 20
     )]
@@ -64,6 +64,6 @@ pub enum LiveError {
         /// Bytes free.
         available: u64,
         /// What would need less.
-        mend: &'static str,
+        fix: &'static str,
     },
 }

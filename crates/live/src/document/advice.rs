@@ -70,10 +70,10 @@ mod tests {
     #[test]
     fn what_comes_with_later_versions_is_reported_as_such() {
         let root = Node::root();
-        let mend = unknown_key("objects", "objects", root, root);
-        assert!(mend.contains("does not have `objects` yet"), "{mend}");
-        let mend = unknown_word("many-light", &["raymarch", "path"]).unwrap();
-        assert!(mend.contains("does not have the integrator `many-light` yet"), "{mend}");
+        let fix = unknown_key("objects", "objects", root, root);
+        assert!(fix.contains("does not have `objects` yet"), "{fix}");
+        let fix = unknown_word("many-light", &["raymarch", "path"]).unwrap();
+        assert!(fix.contains("does not have the integrator `many-light` yet"), "{fix}");
     }
 
     #[test]

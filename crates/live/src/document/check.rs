@@ -54,7 +54,7 @@ impl Check {
             (value, None) => {
                 let problem = Problem::new(path, describe_value(value), describe(node));
                 self.problems.push(match value {
-                    Value::Null => problem.with_mend("leave the key out to use its default"),
+                    Value::Null => problem.with_fix("leave the key out to use its default"),
                     _ => problem,
                 });
             }
@@ -86,7 +86,7 @@ impl Check {
         let place =
             path.rsplit_once('.').map_or("the document".to_owned(), |(table, _)| format!("`{table}`"));
         let problem = Problem::new(path, "an unknown key", format!("a key of {place}"));
-        self.problems.push(problem.with_mend(unknown_key(path, key, node, union)));
+        self.problems.push(problem.with_fix(unknown_key(path, key, node, union)));
     }
 
     fn unknown_type(&mut self, table: &Map<String, Value>, union: Node, path: &str) {
@@ -94,8 +94,8 @@ impl Check {
         let expected = tags.iter().map(|tag| format!("{tag:?}")).collect::<Vec<_>>().join(" or ");
         let found = table.get(TAG).map_or("nothing".to_owned(), describe_value);
         let problem = Problem::new(join(path, TAG), found, expected);
-        let mend = table.get(TAG).and_then(Value::as_str).and_then(|tag| unknown_word(tag, &tags));
-        self.problems.push(Problem { mend, ..problem });
+        let fix = table.get(TAG).and_then(Value::as_str).and_then(|tag| unknown_word(tag, &tags));
+        self.problems.push(Problem { fix, ..problem });
     }
 
     fn alternatives(&mut self, table: &Map<String, Value>, node: Node, path: &str) {
@@ -104,7 +104,7 @@ impl Check {
             match (table.contains_key(a), table.contains_key(b)) {
                 (true, true) => {
                     let problem = Problem::new(path, format!("both `{a}` and `{b}`"), "one of them");
-                    self.problems.push(problem.with_mend("leave one of them out"));
+                    self.problems.push(problem.with_fix("leave one of them out"));
                 }
                 (false, false) if alternatives.needed => {
                     self.report(path, format!("neither `{a}` nor `{b}`"), "one of them");
@@ -120,7 +120,7 @@ impl Check {
                     "both or neither",
                 );
                 self.problems
-                    .push(problem.with_mend(format!("give `{leader}` too, or leave `{companion}` out")));
+                    .push(problem.with_fix(format!("give `{leader}` too, or leave `{companion}` out")));
             }
         }
     }
@@ -147,7 +147,7 @@ impl Check {
             }
         } else if !words.contains(&text) {
             let problem = Problem::new(path, quoted(text), describe(node));
-            self.problems.push(Problem { mend: unknown_word(text, &words), ..problem });
+            self.problems.push(Problem { fix: unknown_word(text, &words), ..problem });
         }
     }
 

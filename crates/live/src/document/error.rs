@@ -101,7 +101,7 @@ pub struct Problem {
     /// What was expected there.
     pub expected: String,
     /// How to fix it, where that is not obvious from what was expected.
-    pub mend: Option<String>,
+    pub fix: Option<String>,
 }
 
 impl Problem {
@@ -110,11 +110,11 @@ impl Problem {
         found: impl Into<String>,
         expected: impl Into<String>,
     ) -> Self {
-        Self { path: path.into(), found: found.into(), expected: expected.into(), mend: None }
+        Self { path: path.into(), found: found.into(), expected: expected.into(), fix: None }
     }
 
-    pub(super) fn with_mend(self, mend: impl Into<String>) -> Self {
-        Self { mend: Some(mend.into()), ..self }
+    pub(super) fn with_fix(self, fix: impl Into<String>) -> Self {
+        Self { fix: Some(fix.into()), ..self }
     }
 }
 
@@ -122,8 +122,8 @@ impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let place = if self.path.is_empty() { "the document" } else { &self.path };
         write!(f, "{place}: found {}, expected {}", self.found, self.expected)?;
-        match &self.mend {
-            Some(mend) => write!(f, "; {mend}"),
+        match &self.fix {
+            Some(fix) => write!(f, "; {fix}"),
             None => Ok(()),
         }
     }
@@ -155,7 +155,7 @@ mod tests {
     fn a_message_says_where_what_was_found_what_was_expected_and_how_to_fix_it() {
         let problem = Problem::new(join("medium", "densty"), "an unknown key", "a key of `medium`");
         assert_eq!(problem.to_string(), "medium.densty: found an unknown key, expected a key of `medium`");
-        let problem = problem.with_mend("did you mean `density`?");
+        let problem = problem.with_fix("did you mean `density`?");
         assert!(problem.to_string().ends_with("; did you mean `density`?"), "{problem}");
     }
 

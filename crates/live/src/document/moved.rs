@@ -18,7 +18,7 @@ pub fn move_old_keys(document: &mut Value) -> Result<Vec<String>, DocumentError>
         let parts: Vec<_> = now.split('.').collect();
         if put(&mut changed, &parts, value).is_err() {
             let problem = Problem::new(old, "a value", format!("nothing, since `{now}` is given too"));
-            return Err(DocumentError::one(problem.with_mend("leave the old key out")));
+            return Err(DocumentError::one(problem.with_fix("leave the old key out")));
         }
         notes.push(format!("`{old}` is now `{now}` and was read as such"));
     }

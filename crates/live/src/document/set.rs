@@ -72,7 +72,7 @@ fn assign(
             let Some(index) = index else {
                 let problem =
                     Problem::new(below, quoted(part), format!("an index into {} items", items.len()));
-                return Err(DocumentError::one(problem.with_mend("the index after the last one appends")));
+                return Err(DocumentError::one(problem.with_fix("the index after the last one appends")));
             };
             if removes {
                 items.remove(index);

@@ -38,7 +38,7 @@ fn validate_points(points: &[TransferPoint], problems: &mut Problems) {
         let [before, here] = [pair[0].value, pair[1].value];
         if here < before {
             let problem = Problem::new(path(i + 1), format!("{here} after {before}"), "ascending values");
-            problems.push(problem.with_mend("order the points by value"));
+            problems.push(problem.with_fix("order the points by value"));
         }
     }
     for (i, triple) in points.windows(3).enumerate() {
@@ -46,7 +46,7 @@ fn validate_points(points: &[TransferPoint], problems: &mut Problems) {
         if triple.iter().all(|point| point.value == here) {
             let found = format!("a third point at {here}");
             let problem = Problem::new(path(i + 2), found, "at most two points at one value (a jump)");
-            problems.push(problem.with_mend("keep only the first and the last point at that value"));
+            problems.push(problem.with_fix("keep only the first and the last point at that value"));
         }
     }
 }
@@ -88,7 +88,7 @@ fn validate_clip(clip: &Clip, path: &str, problems: &mut Problems) {
                 let found =
                     format!("{} on axis {}, where max is {}", min[axis], ["x", "y", "z"][axis], max[axis]);
                 let problem = Problem::new(join(path, "min"), found, "a corner below max on every axis");
-                problems.push(problem.with_mend("give the lowest corner as min and the highest as max"));
+                problems.push(problem.with_fix("give the lowest corner as min and the highest as max"));
             }
         }
     }
@@ -110,7 +110,7 @@ fn require_view(
         let found = format!("a distance of {:e} from `position`", view.length());
         let problem =
             Problem::new(join(path, "target"), found, "a point other than `position`, and not too far away");
-        return problems.push(problem.with_mend("move one of the two"));
+        return problems.push(problem.with_fix("move one of the two"));
     }
     let Some(up) = up else { return };
     let up_path = join(path, "up");
@@ -119,7 +119,7 @@ fn require_view(
     }
     if vector(up).normalize().cross(view.normalize()).length() < SMALLEST_SINE {
         let problem = Problem::new(up_path, format!("{up:?}, which is along the view"), "another direction");
-        problems.push(problem.with_mend("point `up` along another axis"));
+        problems.push(problem.with_fix("point `up` along another axis"));
     }
 }
 

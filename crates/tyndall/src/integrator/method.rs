@@ -201,7 +201,7 @@ pub struct MemoryNeed {
     /// For what, in the plural: "5 light paths".
     pub what: String,
     /// What would take less.
-    pub mend: &'static str,
+    pub fix: &'static str,
 }
 
 /// Samples that a film has taken.

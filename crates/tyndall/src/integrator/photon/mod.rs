@@ -143,7 +143,7 @@ impl Method for PhotonMapper {
                 "{} light paths of up to {max_scatter} scatterings and {} segments a pixel",
                 settings.photons, settings.segments
             ),
-            mend: "fewer of them",
+            fix: "fewer of them",
         })
     }
 

@@ -5,7 +5,7 @@ use crate::math::cast;
 use crate::sampling::{LightPathSampler, PathSampler};
 use std::collections::BTreeSet;
 
-/// Rows that share words today; to be mended in the next change of bits.
+/// Rows that share words today; to be fixed in the next change of bits.
 const KNOWN_OVERLAPS: [[&str; 2]; 4] = [
     // Pass 0 at bounce 0: the emitter numbered as the pixel, the path numbered as the sample. By different methods.
     ["CameraTracking", "LightTracking"],
