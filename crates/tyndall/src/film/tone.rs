@@ -159,7 +159,8 @@ mod tests {
         }
     }
 
-    /// A rounding error of the `AgX` polynomial, whose coefficients add up to 95; the published rows are off grey by 7e-5.
+    /// A rounding error of the `AgX` polynomial, whose coefficients add up to 95; the published rows are off grey by
+    /// 7e-5.
     const ROUNDING: f32 = 95.0 * f32::EPSILON;
 
     #[test]

@@ -12,9 +12,9 @@ use std::fmt::Debug;
 
 /// A method of computing light: its name and settings, and its state while it works on a scene.
 ///
-/// Everything about a sample follows from the scene, its pixel and its number, so that neither threads nor the slices of time
-/// in which a session works leave a trace in the picture. All functions here are called once for a pass or a tile, never once
-/// for a sample. Those that run for long may use the current thread pool.
+/// Everything about a sample follows from the scene, its pixel and its number, so that neither threads nor the slices
+/// of time in which a session works leave a trace in the picture. All functions here are called once for a pass or a
+/// tile, never once for a sample. Those that run for long may use the current thread pool.
 pub trait Method: Sized + Send + Sync + 'static {
     /// Name in the scene document and on the command line: lower-case words joined by hyphens.
     const NAME: &'static str;
@@ -79,8 +79,9 @@ pub trait Method: Sized + Send + Sync + 'static {
     /// Whether samples taken before an edit may differ, by a bit or more, from those that would be taken now.
     fn is_touched_by(&self, difference: &Difference) -> bool;
 
-    /// Goes on from one scene to another that touches it, and keeps what of its own state and of the tiles' is still valid;
-    /// false where that is nothing, and the method is to begin anew. Called for edits that leave its settings alone.
+    /// Goes on from one scene to another that touches it, and keeps what of its own state and of the tiles' is still
+    /// valid; false where that is nothing, and the method is to begin anew. Called for edits that leave its settings
+    /// alone.
     fn update(&mut self, edit: &Edited, tiles: &mut [Self::TileState]) -> bool {
         let _ = (edit, tiles);
         false
@@ -102,8 +103,8 @@ pub trait Method: Sized + Send + Sync + 'static {
         u32::MAX
     }
 
-    /// Adds a sample to every pixel of a tile until the tile has so many `samples`, or is told to stop. What is then half done
-    /// waits in `state` and is taken up by the next call, so that slices of any length get on.
+    /// Adds a sample to every pixel of a tile until the tile has so many `samples`, or is told to stop. What is then
+    /// half done waits in `state` and is taken up by the next call, so that slices of any length get on.
     fn refine(&self, scene: &Scene, tile: &mut Tile, state: &mut Self::TileState, samples: u32, stop: &Stop);
 
     /// What was computed and is kept; `pixels` tells how many samples the film has taken.

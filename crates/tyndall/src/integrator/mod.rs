@@ -1,7 +1,7 @@
 //! The methods of computing light, a folder each, and the one interface by which everything else meets them.
 //!
-//! A new method is a folder with a type that implements [`Method`], and a line in each of the two lists here. Command line, scene
-//! document, sessions, tests and continuous integration go over [`METHODS`].
+//! A new method is a folder with a type that implements [`Method`], and a line in each of the two lists here. Command
+//! line, scene document, sessions, tests and continuous integration go over [`METHODS`].
 
 mod cells;
 mod engine;

@@ -18,8 +18,8 @@ pub(crate) struct ScatteringPoint<'a> {
 }
 
 impl ScatteringPoint<'_> {
-    /// What one light, chosen by power, sends to the point and on to the viewer, weighted by the balance heuristic \[Veach97\]
-    /// against finding the light by the scattered direction.
+    /// What one light, chosen by power, sends to the point and on to the viewer, weighted by the balance heuristic
+    /// \[Veach97\] against finding the light by the scattered direction.
     #[inline(always)]
     pub fn direct<S: Lanes>(
         &self,

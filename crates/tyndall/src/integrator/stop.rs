@@ -4,8 +4,8 @@ use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// What integrators poll after every scattering, so that a stop takes microseconds: whether the work was cancelled or its deadline
-/// has passed. One for each task, since it counts how often it was polled.
+/// What integrators poll after every scattering, so that a stop takes microseconds: whether the work was cancelled or
+/// its deadline has passed. One for each task, since it counts how often it was polled.
 #[derive(Clone, Debug)]
 pub struct Stop<'a> {
     cancel: &'a AtomicBool,

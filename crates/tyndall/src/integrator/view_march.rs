@@ -27,13 +27,13 @@ impl<S: Lanes> Coverage<S> {
 
 /// Computes the light that a packet's samples send along their rays.
 pub(crate) trait Shader<S: Lanes, N> {
-    /// Shades a sample of each ray, of which the viewer sees the share `covered`, 0 in lanes that take none; false to stop
-    /// before the samples count.
+    /// Shades a sample of each ray, of which the viewer sees the share `covered`, 0 in lanes that take none; false to
+    /// stop before the samples count.
     fn shade(&mut self, simd: S, sample: &PacketSample<S>, covered: S::f32s, notes: &mut N) -> bool;
 }
 
-/// Marches until all rays have ended or are opaque. Where the shader stops the march, gives the steps to go on with, whose
-/// samples come again then.
+/// Marches until all rays have ended or are opaque. Where the shader stops the march, gives the steps to go on with,
+/// whose samples come again then.
 #[inline(always)]
 pub(crate) fn composite<S: Lanes, N: MarchNotes<S>, H: Shader<S, N>>(
     simd: S,

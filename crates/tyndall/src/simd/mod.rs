@@ -1,8 +1,8 @@
 //! Vector instructions, selected at run time.
 //!
-//! A kernel is written once, over the lanes of `fearless_simd`, and compiled for every [`Level`]; gather loads, which that
-//! library lacks, are in `gather`. Fused multiply-add rounds once where the scalar level rounds twice, so pictures of two
-//! levels may differ in their last bits; those of one level never do.
+//! A kernel is written once, over the lanes of `fearless_simd`, and compiled for every [`Level`]; gather loads, which
+//! that library lacks, are in `gather`. Fused multiply-add rounds once where the scalar level rounds twice, so pictures
+//! of two levels may differ in their last bits; those of one level never do.
 
 #[expect(unsafe_code, reason = "gathers read through pointers; a comment at each explains why it is sound")]
 mod gather;
@@ -44,8 +44,8 @@ pub(crate) trait Kernel {
     /// Its result.
     type Output;
 
-    /// Must be `#[inline(always)]`, like everything it calls that works on lanes; otherwise the level's instructions are
-    /// not used.
+    /// Must be `#[inline(always)]`, like everything it calls that works on lanes; otherwise the level's instructions
+    /// are not used.
     fn run<S: Lanes>(self, simd: S) -> Self::Output;
 }
 

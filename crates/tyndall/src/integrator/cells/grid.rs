@@ -1,4 +1,5 @@
-//! A grid whose cells are as wide as a gather's radius: a gather finds everything in its own cell and the neighbouring ones.
+//! A grid whose cells are as wide as a gather's radius: a gather finds everything in its own cell and the neighbouring
+//! ones.
 
 use crate::math::{Bounds, DMat3, DVec3, Mat3, Vec3, cast};
 use crate::volume::Grid;
@@ -6,17 +7,17 @@ use crate::volume::Grid;
 /// Largest number of cells: a smaller radius gets wider cells.
 const MOST_CELLS: f32 = (1 << 24) as f32;
 
-/// Margin by which a cell is wider than the radius: more than the rounding error of a position in single precision, so that a
-/// position rounded into the neighbouring cell still finds all within its radius. In a volume many radii wide the error grows
-/// with its extent.
+/// Margin by which a cell is wider than the radius: more than the rounding error of a position in single precision, so
+/// that a position rounded into the neighbouring cell still finds all within its radius. In a volume many radii wide
+/// the error grows with its extent.
 const MARGIN: f32 = 1e-4;
 const MARGIN_OF_EXTENT: f32 = 1.0 / (1 << 22) as f32;
 
 /// Bits of one axis of the paper's spatial history.
 const AXIS_BITS: f32 = 64.0;
 
-/// Cells over the medium's box in *metric* space: the world about the box's middle, in units of the radius, which keeps numbers
-/// near 1 whatever the world's unit is.
+/// Cells over the medium's box in *metric* space: the world about the box's middle, in units of the radius, which keeps
+/// numbers near 1 whatever the world's unit is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CellGrid {
     middle: Vec3,
@@ -48,7 +49,8 @@ impl CellGrid {
             edge *= 1.1;
         }
         let dims = cells(edge).to_array().map(cast::index);
-        // The extent of a box along an axis of index space is the sum of the absolute entries of that row of the inverse.
+        // The extent of a box along an axis of index space is the sum of the absolute entries of that row of the
+        // inverse.
         let rows = to_index.transpose();
         let entries = |row: Vec3| row.abs().element_sum();
         let box_ = Vec3::new(entries(rows.x_axis), entries(rows.y_axis), entries(rows.z_axis));

@@ -1,5 +1,5 @@
-//! The spatial history \[Jonsson12, sec. 4.3.2\]: marks of where items appeared, moved or vanished, queried by whatever reads
-//! items within reach.
+//! The spatial history \[Jonsson12, sec. 4.3.2\]: marks of where items appeared, moved or vanished, queried by whatever
+//! reads items within reach.
 
 use super::Positioned;
 use super::grid::CellGrid;
@@ -76,7 +76,8 @@ impl ChangeMarks {
         self.marks.load(Ordering::Relaxed) > self.enough
     }
 
-    /// Marks items that differ from those before, from the first difference on, and those that count as changed `otherwise`.
+    /// Marks items that differ from those before, from the first difference on, and those that count as changed
+    /// `otherwise`.
     pub fn mark_difference<P: Positioned + Pod>(&self, old: &[P], new: &[P], otherwise: impl Fn(&P) -> bool) {
         let same =
             |(old, new): (&P, &P)| bytemuck::bytes_of(old) == bytemuck::bytes_of(new) && !otherwise(new);

@@ -24,8 +24,8 @@ impl CellStarts {
     }
 }
 
-/// Items of several lists in the order of their cells, then of the lists, then as they stand in their list, so that what is
-/// added up in this order does not depend on what was computed when.
+/// Items of several lists in the order of their cells, then of the lists, then as they stand in their list, so that
+/// what is added up in this order does not depend on what was computed when.
 #[derive(Debug)]
 pub(crate) struct SortedItems {
     keys: Vec<u64>,

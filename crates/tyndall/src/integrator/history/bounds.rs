@@ -1,8 +1,9 @@
-//! Which values a cell's opacity bounds come from: a flight that crosses a cell depends on these, not on all values in the cell.
+//! Which values a cell's opacity bounds come from: a flight that crosses a cell depends on these, not on all values in
+//! the cell.
 //!
-//! A flight notes the groups that attain a cell's majorant. As long as their opacity stays, the majorant can only rise, by other
-//! groups; an edit that does so asks for the groups that attained the old one. A flight that neither meets has read the
-//! same majorants. The smallest opacity, which transmittance estimates also use, is recorded the same way.
+//! A flight notes the groups that attain a cell's majorant. As long as their opacity stays, the majorant can only rise,
+//! by other groups; an edit that does so asks for the groups that attained the old one. A flight that neither meets has
+//! read the same majorants. The smallest opacity, which transmittance estimates also use, is recorded the same way.
 
 use super::touched::around;
 use crate::medium::{MajorantGrid, Medium};
@@ -10,7 +11,8 @@ use crate::transfer::{HistoryGroups, Historygram, TransferFunction};
 use crate::volume::ValueBins;
 use rayon::prelude::*;
 
-/// Bound of an opacity's rounding error, relative and absolute; with it a few groups too many count as attaining a bound.
+/// Bound of an opacity's rounding error, relative and absolute; with it a few groups too many count as attaining a
+/// bound.
 const ROUNDING: (f32, f32) = (1e-4, 1e-6);
 
 /// Of each majorant cell what its limits come from.
@@ -54,8 +56,8 @@ impl Bounds {
         least | most
     }
 
-    /// What must be queried in addition to the groups whose opacity an edit changed: groups of cells whose smallest opacity falls
-    /// or whose majorant rises. For empty cells the changed groups suffice.
+    /// What must be queried in addition to the groups whose opacity an edit changed: groups of cells whose smallest
+    /// opacity falls or whose majorant rises. For empty cells the changed groups suffice.
     pub fn moved(&self, old: &MajorantGrid, new: &MajorantGrid) -> [Historygram; 2] {
         let mut query = [Historygram::EMPTY; 2];
         for ((old, new), attained) in old.opacities().iter().zip(new.opacities()).zip(&self.0) {

@@ -12,8 +12,8 @@ use crate::transfer::{Grouping, HistoryGroups, Historygram};
 use crate::volume::ValueBins;
 use bounds::Bounds;
 
-/// What a light path or one of its vertices depends on: values read in flight, for their opacity, and values at scatterings,
-/// for their albedo and surfaces. Both accumulate along the path.
+/// What a light path or one of its vertices depends on: values read in flight, for their opacity, and values at
+/// scatterings, for their albedo and surfaces. Both accumulate along the path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Past {
     pub flight: Historygram,
@@ -67,8 +67,8 @@ impl Reading {
         self.groups.of(bins.bin(value))
     }
 
-    /// Updates to a medium with other opacities; returns what flights must be queried for in addition to the groups whose
-    /// opacity changed, see [`Bounds::moved`].
+    /// Updates to a medium with other opacities; returns what flights must be queried for in addition to the groups
+    /// whose opacity changed, see [`Bounds::moved`].
     pub fn update(&mut self, old: &Medium, new: &Medium) -> [Historygram; 2] {
         let moved = self.bounds.moved(old.majorants(), new.majorants());
         self.bounds = Bounds::new(&self.groups, &self.cells, new);

@@ -5,7 +5,8 @@ use crate::scene::{Difference, Scene};
 use crate::transfer::{BinSet, HistoryGroups, Historygram, TransferFunction};
 use crate::volume::ValueBins;
 
-/// The query with which an edit tests histories \[Jonsson12, sec. 4.2\], if it left volume, clips and random numbers unchanged.
+/// The query with which an edit tests histories \[Jonsson12, sec. 4.2\], if it left volume, clips and random numbers
+/// unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Touched {
     /// Values whose change makes a path diverge from the retraced one.

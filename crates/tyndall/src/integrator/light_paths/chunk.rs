@@ -1,5 +1,5 @@
-//! A chunk: up to 1024 paths of one light that start near each other. They are traced together, so that they read the same matter,
-//! and retraced where an edit touched them.
+//! A chunk: up to 1024 paths of one light that start near each other. They are traced together, so that they read the
+//! same matter, and retraced where an edit touched them.
 
 use super::tracer::{LightPath, Resumed, Tracer, Vertex, Vertices, bounce_of};
 use super::{HistoryDetail, PathNumbers};
@@ -149,7 +149,8 @@ impl<V: Vertex> Chunk<V> {
     }
 }
 
-/// Retraces the invalid paths of a chunk, each from its last valid vertex on, until a stop; returns how many were traced.
+/// Retraces the invalid paths of a chunk, each from its last valid vertex on, until a stop; returns how many were
+/// traced.
 pub(super) struct Update<'a, V> {
     pub chunk: &'a mut Chunk<V>,
     pub tracer: Tracer<'a>,

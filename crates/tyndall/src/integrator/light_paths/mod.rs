@@ -1,5 +1,6 @@
-//! Paths from the lights of a scene and from its glowing matter, generic over what a method stores at a vertex. Each light has
-//! equally many, so that no edit of one light changes the paths of others; an edit retraces those that it touched.
+//! Paths from the lights of a scene and from its glowing matter, generic over what a method stores at a vertex. Each
+//! light has equally many, so that no edit of one light changes the paths of others; an edit retraces those that it
+//! touched.
 
 mod chunk;
 mod tracer;
@@ -95,8 +96,9 @@ pub(crate) struct PathSource {
     pub stream: u32,
 }
 
-/// A scene's lights and its glowing matter, with the streams of their random numbers: by name where a light has one, so that
-/// it keeps them when others come and go; else by its number. In the order of the streams, in which light is added up too.
+/// A scene's lights and its glowing matter, with the streams of their random numbers: by name where a light has one, so
+/// that it keeps them when others come and go; else by its number. In the order of the streams, in which light is added
+/// up too.
 pub(crate) fn sources(scene: &Scene) -> Vec<PathSource> {
     let lights = scene.lights.lights();
     let mut first_of: HashMap<&str, usize> = HashMap::new();
@@ -122,7 +124,8 @@ pub(crate) fn sources(scene: &Scene) -> Vec<PathSource> {
 }
 
 impl<V: Vertex> LightPaths<V> {
-    /// Paths yet to be traced. In each block of paths that are stratified together, those that start alike come together.
+    /// Paths yet to be traced. In each block of paths that are stratified together, those that start alike come
+    /// together.
     pub fn new(PathSource { light, stream }: PathSource, plan: &Plan) -> Self {
         let Plan { count, seed, pass, groups, histories } = *plan;
         const BLOCK: u32 = LightPathSampler::STRATIFIED;
@@ -210,7 +213,8 @@ impl Tracing<'_> {
     }
 }
 
-/// The position of four numbers in [0, 1) on a curve that fills their space: similar numbers have positions near each other.
+/// The position of four numbers in [0, 1) on a curve that fills their space: similar numbers have positions near each
+/// other.
 fn morton(u: [f32; 4]) -> u32 {
     let steps = u.map(|u| cast::low_u32(cast::index(u * 256.0) as u64));
     let bit = |i: u32| {

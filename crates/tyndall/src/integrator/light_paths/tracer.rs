@@ -20,7 +20,8 @@ pub(crate) trait Vertex: Positioned + Pod + Debug + PartialEq {
     /// In which the light travels.
     fn direction(&self) -> Vec3;
 
-    /// Flux per unit of its light's colour, times the paths of that light: of this vertex and of those left out like it.
+    /// Flux per unit of its light's colour, times the paths of that light: of this vertex and of those left out like
+    /// it.
     fn flux(&self) -> Rgb;
 }
 
@@ -35,8 +36,8 @@ pub(crate) struct Arrival {
     pub flux: Rgb,
 }
 
-/// The first vertices of a path are all stored, later ones with falling probability, carrying the flux of those left out: light
-/// of long paths is spread so widely that storing all of it would cost memory without reducing noise.
+/// The first vertices of a path are all stored, later ones with falling probability, carrying the flux of those left
+/// out: light of long paths is spread so widely that storing all of it would cost memory without reducing noise.
 const WHOLE: u32 = 4;
 
 /// Probability that a vertex is stored, by the number of scatterings before it.
@@ -55,8 +56,8 @@ pub(super) fn bounce_of(numbers: &LightPathSampler, kept: usize) -> u32 {
     bounces.nth(kept).unwrap_or(u32::MAX)
 }
 
-/// Interactions of a path that are kept on average if none is absorbed: of `max_scatter` the first few, and of the others the
-/// sum of their chances.
+/// Interactions of a path that are kept on average if none is absorbed: of `max_scatter` the first few, and of the
+/// others the sum of their chances.
 pub(crate) fn most_kept(max_scatter: u32) -> f64 {
     let whole = f64::from(WHOLE);
     let last = f64::from(max_scatter);
@@ -183,8 +184,8 @@ impl Tracer<'_> {
         LightPath { flight, past }
     }
 
-    /// Continues to the path's end, or until a stop, but for at least one scattering; returns whether the path has ended. Its past
-    /// then is what the whole path depends on, including matter that it passed without a collision.
+    /// Continues to the path's end, or until a stop, but for at least one scattering; returns whether the path has
+    /// ended. Its past then is what the whole path depends on, including matter that it passed without a collision.
     #[inline(always)]
     pub fn go_on<V: Vertex>(
         &self,
@@ -235,8 +236,8 @@ impl Tracer<'_> {
         }))
     }
 
-    /// Scatters or absorbs the light \[Jonsson12, eq. 7\]: it survives with the albedo of its brightest channel, which depends on
-    /// the position alone and not on the path's flux, so that a black channel does not end the others.
+    /// Scatters or absorbs the light \[Jonsson12, eq. 7\]: it survives with the albedo of its brightest channel, which
+    /// depends on the position alone and not on the path's flux, so that a black channel does not end the others.
     #[inline(always)]
     fn scatter<V: Vertex>(
         &self,

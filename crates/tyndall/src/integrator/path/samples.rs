@@ -1,5 +1,5 @@
-//! Samples that survive edits \[Jonsson12, sec. 7\]: each is kept with its histories, and only those that an edit touched are
-//! retaken.
+//! Samples that survive edits \[Jonsson12, sec. 7\]: each is kept with its histories, and only those that an edit
+//! touched are retaken.
 
 use crate::film::{PixelSample, Tile};
 use crate::integrator::history::{PackedHistories, Past, Reading, Touched};

@@ -12,7 +12,8 @@ use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes};
 use std::ops::ControlFlow;
 
-/// Russian roulette begins below this throughput; at 1 every path survives with its throughput as probability. Against 1/4 this makes the same error in 0.75 (coloured cloud) to 1.02 (white cloud) of the time.
+/// Russian roulette begins below this throughput; at 1 every path survives with its throughput as probability. Against
+/// 1/4 this makes the same error in 0.75 (coloured cloud) to 1.02 (white cloud) of the time.
 const ROULETTE_WEIGHT: f32 = 1.0;
 
 /// Adds one path to every pixel of a tile until each has so many samples, unless a stop comes first.
@@ -158,8 +159,8 @@ impl CameraPath {
             return ControlFlow::Break(());
         };
         let optics = medium.transfer().optics(collision.value);
-        // At the last order only emission is read. It decides how lights are chosen, and a path of any scattering has already
-        // sampled one, so that its history holds that dependence; only an order-0 path has not.
+        // At the last order only emission is read. It decides how lights are chosen, and a path of any scattering has
+        // already sampled one, so that its history holds that dependence; only an order-0 path has not.
         if *order < scene.render.max_scatter || *order == 0 {
             notes.scatters(collision.value);
         }

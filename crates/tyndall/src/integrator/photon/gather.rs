@@ -29,8 +29,8 @@ pub(super) struct Gathering {
 }
 
 impl PhotonMap {
-    /// Light from everywhere that a position scatters to a viewer, per unit extinction. `notes` is told of the values that are
-    /// read around the position.
+    /// Light from everywhere that a position scatters to a viewer, per unit extinction. `notes` is told of the values
+    /// that are read around the position.
     #[inline(always)]
     pub fn scattered<S: Lanes>(
         &self,
@@ -109,8 +109,8 @@ impl PhotonMap {
         [load(simd, &self.x, i) - q.x, load(simd, &self.y, i) - q.y, load(simd, &self.z, i) - q.z]
     }
 
-    /// Distance of the `count`-th nearest photon, at most the radius, in units of it. The estimate takes those nearer than that one, which
-    /// leaves it without bias where photons lie evenly.
+    /// Distance of the `count`-th nearest photon, at most the radius, in units of it. The estimate takes those nearer
+    /// than that one, which leaves it without bias where photons lie evenly.
     #[inline(always)]
     fn radius_of<S: Lanes>(&self, simd: S, at: &Gathering, count: usize, distances: &mut Vec<f32>) -> f32 {
         let q = self.grid.to_metric(at.position);
@@ -150,8 +150,8 @@ const MOST_THICK: f32 = 1.5;
 /// At a boundary of matter its mean position is off by at least this share of the radius.
 const LEAN_OF_SKIN: f32 = 0.1;
 
-/// Along which axis a gather is to be flattened, and to what share of its radius: at the skin of matter so dense that little
-/// light gets as deep as the radius. `thickness` is the optical depth of the map's radius.
+/// Along which axis a gather is to be flattened, and to what share of its radius: at the skin of matter so dense that
+/// little light gets as deep as the radius. `thickness` is the optical depth of the map's radius.
 #[inline(always)]
 fn flat_skin(lean: Vec3, radius: f32, thickness: f32) -> Option<(Vec3, f32)> {
     let thickness = thickness * radius;

@@ -86,8 +86,8 @@ impl GatherRegion for Ball<'_> {
     }
 }
 
-/// All that a piece of a ray passes within a radius: the beam radiance estimate \[Jarosz08\], piece by piece. Together the
-/// pieces make one beam.
+/// All that a piece of a ray passes within a radius: the beam radiance estimate \[Jarosz08\], piece by piece. Together
+/// the pieces make one beam.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slice<'a> {
     /// Along the ray.
@@ -202,8 +202,9 @@ fn placed<S: Lanes>(
     [a * u.x + b * v.x + c * w.x, a * u.y + b * v.y + c * w.y, a * u.z + b * v.z + c * w.z]
 }
 
-/// Points of the unit ball, and of the cylinder of radius 1 from -1 to 1. Planes across the last axis of the ball, and across the
-/// first and the last of the cylinder, have as many points on one side as they have volume there, to half a point.
+/// Points of the unit ball, and of the cylinder of radius 1 from -1 to 1. Planes across the last axis of the ball, and
+/// across the first and the last of the cylinder, have as many points on one side as they have volume there, to half a
+/// point.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Points {
     ball: [[f32; MOST_LANES]; 3],

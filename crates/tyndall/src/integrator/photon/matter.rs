@@ -1,13 +1,14 @@
 //! How much matter photons have met where they are gathered.
 //!
-//! Photons lie where light collides, also where it is then absorbed: their flux in a part of space estimates the integral of
-//! extinction times fluence over it. \[Jonsson12, eq. 8\] divides by the scattering at the position alone, which is wrong at
-//! every albedo but 1, and at the skin of matter, where half of the sphere holds none. Here fluence is taken to be linear
-//! about the position, `a + b x`, and fitted to the flux and its first moment, as local regression does at a border \[Fan92\]:
-//! with the moments `m0`, `m1`, `m2` of the extinction that is `a = sum (1 - c x) flux / (m0 - c m1)`, `c = m2^-1 m1`.
+//! Photons lie where light collides, also where it is then absorbed: their flux in a part of space estimates the
+//! integral of extinction times fluence over it. \[Jonsson12, eq. 8\] divides by the scattering at the position alone,
+//! which is wrong at every albedo but 1, and at the skin of matter, where half of the sphere holds none. Here fluence
+//! is taken to be linear about the position, `a + b x`, and fitted to the flux and its first moment, as local
+//! regression does at a border \[Fan92\]: with the moments `m0`, `m1`, `m2` of the extinction that is `a = sum (1 - c
+//! x) flux / (m0 - c m1)`, `c = m2^-1 m1`.
 //!
-//! Matter denser than the position counts as dense as the position, and its photons for so much less: else what the points miss of a
-//! dense neighbour, and the flux there, would light up all the thin matter about it.
+//! Matter denser than the position counts as dense as the position, and its photons for so much less: else what the
+//! points miss of a dense neighbour, and the flux there, would light up all the thin matter about it.
 
 use super::kernel::GatherRegion;
 use crate::math::{Mat3, Vec3};
@@ -37,7 +38,8 @@ pub(super) struct Matter {
 }
 
 impl Matter {
-    /// About a position of index space, whose own opacity is given and positive; `to_index` takes metric vectors to index space.
+    /// About a position of index space, whose own opacity is given and positive; `to_index` takes metric vectors to
+    /// index space.
     #[inline(always)]
     pub fn about<S: Lanes>(
         simd: S,

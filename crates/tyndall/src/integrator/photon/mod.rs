@@ -1,13 +1,13 @@
 //! Photon mapping that survives edits \[Jonsson12\].
 //!
-//! Light paths leave photons where they interact with matter (`paths`), sorted by position (`map`); rays from the camera gather
-//! them, in segments (`segments`). Path and segment know the data values that they read, as a Historygram, so that an
-//! edit of the transfer function redoes those alone that read what it changed. Where photons changed is known too
-//! (`spatial`), for the segments that gather there.
+//! Light paths leave photons where they interact with matter (`paths`), sorted by position (`map`); rays from the
+//! camera gather them, in segments (`segments`). Path and segment know the data values that they read, as a
+//! Historygram, so that an edit of the transfer function redoes those alone that read what it changed. Where photons
+//! changed is known too (`spatial`), for the segments that gather there.
 //!
-//! All is plain data in flat arrays, and everything follows from scene and numbers: what is redone comes out as it would
-//! from nothing, bit for bit. The first sample of every pixel is this *base map*; later ones are refinement passes with
-//! photons of their own and a shrinking radius \[Knaus11\], and start anew after an edit.
+//! All is plain data in flat arrays, and everything follows from scene and numbers: what is redone comes out as it
+//! would from nothing, bit for bit. The first sample of every pixel is this *base map*; later ones are refinement
+//! passes with photons of their own and a shrinking radius \[Knaus11\], and start anew after an edit.
 
 mod edit;
 mod gather;
@@ -281,8 +281,8 @@ fn plan(scene: &Scene, settings: &Settings, sources: usize) -> Plan {
     }
 }
 
-/// Step of a view ray in world units: short enough that attenuation within a step of the densest matter is small, with a lower
-/// bound.
+/// Step of a view ray in world units: short enough that attenuation within a step of the densest matter is small, with
+/// a lower bound.
 fn step(scene: &Scene, settings: &Settings) -> f32 {
     const THICKEST: f32 = 0.5;
     const SHORTEST: f32 = 1.0 / 16.0;
@@ -302,8 +302,8 @@ fn cells_for(scene: &Scene, settings: &Settings, radius: f32) -> CellGrid {
     CellGrid::new(grid, radius, reach)
 }
 
-/// Marks of changed photons, in the map's own cells: a gather sums photons cell by cell, so that even a photon outside its radius
-/// can change its last bit.
+/// Marks of changed photons, in the map's own cells: a gather sums photons cell by cell, so that even a photon outside
+/// its radius can change its last bit.
 fn marks_for(scene: &Scene, settings: &Settings) -> ChangeMarks {
     let medium = &*scene.medium;
     let grid = cells_for(scene, settings, settings.radius);

@@ -35,7 +35,8 @@ pub(super) struct SegmentCounts {
     pub gathers: usize,
 }
 
-/// What a segment shows. How much passes it and where it lies are as good as exact in 16 bits, its light in no less than 32.
+/// What a segment shows. How much passes it and where it lies are as good as exact in 16 bits, its light in no less
+/// than 32.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 struct Segment {
@@ -218,8 +219,8 @@ fn segment_of(step: i32, per_ray: usize, count: i32) -> usize {
     usize::try_from(number).unwrap_or(0).min(per_ray - 1)
 }
 
-/// Share of a gather that is due at the beginning of a segment: even over neighbouring pixels and segments, by a lattice of
-/// irrational steps.
+/// Share of a gather that is due at the beginning of a segment: even over neighbouring pixels and segments, by a
+/// lattice of irrational steps.
 fn due_in([x, y]: [u32; 2], segment: usize) -> f32 {
     let along = cast::fit_u32(segment).wrapping_mul(0x9e37_79b9);
     let turn = x.wrapping_mul(0xc13f_a9a9).wrapping_add(y.wrapping_mul(0x91e1_0da5)).wrapping_add(along);

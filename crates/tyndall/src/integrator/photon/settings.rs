@@ -13,7 +13,8 @@ pub struct Settings {
     #[schemars(range(min = 1, max = 268_435_456))]
     pub photons: u32,
 
-    /// Radius within which light is gathered: larger is smoother, and blurs. A sphere in world space, whatever the spacing.
+    /// Radius within which light is gathered: larger is smoother, and blurs. A sphere in world space, whatever the
+    /// spacing.
     #[schemars(range(min = 0.01, max = 1000))]
     pub radius: f32,
 

@@ -11,8 +11,8 @@ use crate::transfer::{HistoryGroups, Historygram};
 use crate::volume::ValueBins;
 use fearless_simd::prelude::*;
 
-/// Most opacity that a ray accumulates between two gathers, unless the spacing of the settings is reached first: so little that one
-/// gather represents all of it.
+/// Most opacity that a ray accumulates between two gathers, unless the spacing of the settings is reached first: so
+/// little that one gather represents all of it.
 const MOST_COVERED: f32 = 1.0 / 16.0;
 
 /// Inputs of viewing.
@@ -63,7 +63,8 @@ pub(super) struct Stretch {
 }
 
 impl View<'_> {
-    /// Marches all stretches to their ends, or to where they are opaque. What a lane finds does not depend on the others.
+    /// Marches all stretches to their ends, or to where they are opaque. What a lane finds does not depend on the
+    /// others.
     #[inline(always)]
     pub fn march<S: Lanes, N: MarchNotes<S>>(
         &self,

@@ -1,5 +1,5 @@
-//! The least that a method can be, for tests: every ray sees a colour, and the matter nothing. All that a new method needs is in
-//! this folder and in its line of the list of methods.
+//! The least that a method can be, for tests: every ray sees a colour, and the matter nothing. All that a new method
+//! needs is in this folder and in its line of the list of methods.
 
 use super::{Method, Resources, Stop};
 use crate::film::{PixelSample, Tile};
