@@ -1,4 +1,4 @@
-//! The rendering method that a scene selects, with its settings; the scene knows the type of neither.
+//! The rendering method that a scene selects, with its settings; the scene knows nothing about either.
 
 use std::any::Any;
 use std::fmt::Debug;

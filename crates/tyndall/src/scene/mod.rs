@@ -31,7 +31,7 @@ pub struct Scene {
     pub render: RenderSettings,
 }
 
-/// What the camera sees where a ray meets no matter.
+/// What the camera sees behind the matter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Background {
     /// The visible environments; black without one.

@@ -97,7 +97,7 @@ impl Session {
     }
 
     /// Continues with an edited scene; returns what the edit changed. This is the only function that discards results,
-    /// and the difference alone decides which: the session then converges to the same picture as a new one.
+    /// and the difference alone decides which: the session then renders the same picture as a new one.
     pub fn set_scene(&mut self, scene: Scene) -> Difference {
         let difference = Difference::between(&self.scene, &scene);
         let old = std::mem::replace(&mut self.scene, scene);
@@ -184,8 +184,7 @@ impl Session {
             if !prepared {
                 break;
             }
-            // Later, when this does not delay the picture noticeably, do several passes at once so that threads wait
-            // less.
+            // Later, several passes at once do not delay the picture noticeably, and threads wait less for each other.
             let passes = (so_far / 4).clamp(1, 16).min(engine.samples_at_once());
             let pass = so_far.saturating_add(passes).min(budget.samples);
             let begun = Instant::now();
