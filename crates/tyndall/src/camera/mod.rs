@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thin_lens_is_sharp_at_its_focus_alone() {
+    fn a_thin_lens_is_sharp_only_at_its_focus() {
         let lens = camera(Lens::Perspective { fov: 40.0, aperture: 2.0, focus: 8.0 });
         let pinhole = camera(Lens::Perspective { fov: 40.0, aperture: 0.0, focus: 8.0 });
         let at_z = |r: Ray, z: f32| r.at((z - r.origin.z) / r.direction.z);

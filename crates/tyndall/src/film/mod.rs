@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_ahead_of_the_others_counts_for_itself() {
+    fn tiles_may_have_different_numbers_of_samples() {
         let mut film = Film::new([32, 16]);
         let grey = |_: [u32; 2], _: u32| PixelSample { radiance: Rgb::WHITE, ..PixelSample::default() };
         add_pass(&mut film.tiles_mut()[1], grey);

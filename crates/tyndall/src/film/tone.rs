@@ -164,7 +164,7 @@ mod tests {
     const ROUNDING: f32 = 95.0 * f32::EPSILON;
 
     #[test]
-    fn grey_stays_grey_and_grows() {
+    fn grey_stays_grey_and_monotonic() {
         for curve in CURVES {
             let mut last = 0.0;
             for step in -400_i16..400 {

@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn directions_come_back() {
+    fn directions_survive_packing() {
         let axes = [Vec3::X, Vec3::Y, Vec3::Z];
         for v in axes.into_iter().flat_map(|v| [v, -v]) {
             assert_eq!(PackedDirection::new(v).unpack(), v);

@@ -61,7 +61,7 @@ impl Scene {
         let volume = self.medium.volume();
         let values = volume.value_range().map(crate::math::cast::single);
         if self.medium.transfer().opacity_range(values)[1] <= 0.0 {
-            notes.push("no value of the data has any opacity: nothing of the volume can be seen");
+            notes.push("no value of the data has any opacity: the volume is invisible");
         }
         if self.medium.clip().cuts_all(&volume.grid().index_bounds()) {
             notes.push("a clip cuts the whole volume away");

@@ -139,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_go_by_name() {
+    fn levels_are_found_by_name() {
         for level in Level::available() {
             assert_eq!(level.name().parse(), Ok(level));
         }
