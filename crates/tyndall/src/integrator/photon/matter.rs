@@ -4,12 +4,12 @@
 //! estimates the integral of extinction times fluence over it. \[Jonsson12, eq. 8\] divides only by the scattering at
 //! the position, which is wrong for every albedo except 1, and at the surface of matter, where half of the sphere is
 //! empty. Here fluence is assumed to be linear about the position, `a + b x`, and fitted to the flux and its first
-//! moment, as in local regression at a boundary \[Fan92\]: with the moments `m0`, `m1`, `m2` of the extinction, `a =
-//! sum (1 - c x) flux / (m0 - c m1)`, `c = m2^-1 m1`.
+//! moment, as in local regression at a boundary \[Fan92\]: with the moments `m0`, `m1`, `m2` of the extinction,
+//! `a = sum (1 - c x) flux / (m0 - c m1)`, `c = m2^-1 m1`.
 //!
 //! Matter denser than at the position counts as if it had the density at the position, and its photons are scaled down
-//! accordingly. Otherwise the flux in a dense neighbour that the points undersample would light up all the thin matter
-//! around it.
+//! accordingly. Otherwise a dense neighbour that the points miss
+//! would light up all the thin matter around it.
 
 use super::kernel::GatherRegion;
 use crate::math::{Mat3, Vec3};
