@@ -8,8 +8,7 @@
 //! `a = sum (1 - c x) flux / (m0 - c m1)`, `c = m2^-1 m1`.
 //!
 //! Matter denser than at the position counts as if it had the density at the position, and its photons are scaled down
-//! accordingly. Otherwise a dense neighbour that the points miss
-//! would light up all the thin matter around it.
+//! accordingly. Otherwise a dense neighbour that the points miss would light up all the thin matter around it.
 
 use super::kernel::GatherRegion;
 use crate::math::{Mat3, Vec3};
