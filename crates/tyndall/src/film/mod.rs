@@ -1,34 +1,34 @@
 //! The film: mean and variance of every pixel.
 //!
-//! It is cut into tiles that each thread has for itself, so that pixels next to each other never
-//! share a cache line across threads and each tile may be a sample ahead of another.
+//! The film is divided into tiles, each processed by one thread at a time, so that neighbouring pixels never share a
+//! cache line across threads and a tile may be a sample ahead of another.
 
 pub mod tone;
 
 use crate::math::{Rgb, cast};
 use std::sync::Arc;
 
-/// What one sample of a pixel found.
+/// The result of one sample of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelSample {
     /// Radiance; premultiplied where the background is transparent.
     pub radiance: Rgb,
     /// 1 - transmittance to the background, or an unbiased estimate of it.
     pub alpha: f32,
-    /// Distance along the view of the matter seen, times `alpha`.
+    /// Distance of the visible matter along the view direction, times `alpha`.
     pub depth: f32,
 }
 
 /// Edge of a tile in pixels.
 pub const TILE: u32 = 16;
 
-/// Mean and scatter of the samples of one pixel.
+/// Mean and sum of squared deviations of the samples of one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Pixel {
     mean: [f32; 3],
     /// Sum of squared deviations from the mean.
     scatter: [f32; 3],
-    /// The same of the luminance, which the channels' own do not tell.
+    /// The same for the luminance; it cannot be derived from those of the channels.
     luminance_scatter: f32,
     alpha: f32,
     depth: f32,
@@ -63,10 +63,10 @@ fn luminance_of([r, g, b]: [f64; 3]) -> f64 {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
     origin: [u32; 2],
-    /// Where each pixel lies in the tile: block by block of 4 x 4, so that pixels that follow each other are near.
+    /// Position of each pixel in the tile, in blocks of 4 x 4, so that consecutive pixels are close together.
     order: Arc<[[u32; 2]]>,
     samples: u32,
-    /// Pixels that have one sample more.
+    /// Number of pixels that have one sample more.
     ahead: usize,
     pixels: Vec<Pixel>,
 }
@@ -75,25 +75,25 @@ pub struct Tile {
 const BLOCK: u32 = 4;
 
 impl Tile {
-    /// Samples that every pixel of the tile has.
+    /// Number of samples that every pixel of the tile has.
     #[must_use]
     pub fn samples(&self) -> u32 {
         self.samples
     }
 
-    /// Pixels in it.
+    /// Number of pixels.
     #[must_use]
     pub fn pixel_count(&self) -> usize {
         self.pixels.len()
     }
 
-    /// Samples that its pixels have taken, all together.
+    /// Number of samples that its pixels have taken in total.
     #[must_use]
     pub fn taken(&self) -> usize {
         self.samples as usize * self.pixels.len() + self.ahead
     }
 
-    /// The pixels that are next to take a sample, all with the same number, which comes second; at most `most`.
+    /// At most `most` pixels that are next to take a sample, and the sample number, which is the same for all of them.
     pub fn next(&self, most: usize) -> (impl ExactSizeIterator<Item = [u32; 2]>, u32) {
         let last = self.order.len().min(self.ahead + most);
         let [x, y] = self.origin;
@@ -103,7 +103,7 @@ impl Tile {
         )
     }
 
-    /// Adds the sample of the pixel whose turn it is.
+    /// Adds a sample to the next pixel in turn.
     pub fn add(&mut self, sample: &PixelSample) {
         self.pixels[self.ahead].add(sample, f64::from(self.samples) + 1.0);
         self.ahead += 1;
@@ -113,7 +113,7 @@ impl Tile {
         }
     }
 
-    /// Samples of the `i`-th pixel.
+    /// Number of samples of the `i`-th pixel.
     fn samples_of(&self, i: usize) -> f64 {
         f64::from(self.samples) + f64::from(i < self.ahead)
     }
@@ -126,7 +126,7 @@ fn order([width, height]: [u32; 2]) -> Arc<[[u32; 2]]> {
     positions.into()
 }
 
-/// A picture in the making.
+/// A picture being rendered.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     size: [u32; 2],
@@ -142,12 +142,12 @@ pub struct Image {
     pub rgba: Vec<[f32; 4]>,
     /// Variance of each pixel's mean; infinite with one sample.
     pub variance: Vec<[f32; 3]>,
-    /// Mean distance along the view of the matter seen, world units; infinite where none is.
+    /// Mean distance of the visible matter along the view direction, world units; infinite where there is none.
     pub depth: Vec<f32>,
 }
 
 impl Film {
-    /// Black, without samples. Both sides at least 1.
+    /// Black, without samples. Width and height must be at least 1.
     #[must_use]
     pub fn new(size: [u32; 2]) -> Self {
         let [columns, rows] = size.map(|n| n.div_ceil(TILE));
@@ -162,13 +162,13 @@ impl Film {
         Self { size, tiles: (0..columns * rows).map(tile).collect() }
     }
 
-    /// Tiles of a film of a size.
+    /// Number of tiles of a film of this size.
     #[must_use]
     pub fn tile_count(size: [u32; 2]) -> usize {
         size.map(|n| n.div_ceil(TILE) as usize).iter().product()
     }
 
-    /// Bytes that a film of a size keeps.
+    /// Bytes that a film of this size occupies.
     #[must_use]
     pub fn bytes(size: [u32; 2]) -> u64 {
         u64::from(size[0]) * u64::from(size[1]) * size_of::<Pixel>() as u64
@@ -180,12 +180,12 @@ impl Film {
         self.size
     }
 
-    /// The tiles, to be worked on apart.
+    /// The tiles, which can be processed independently.
     pub fn tiles_mut(&mut self) -> &mut [Tile] {
         &mut self.tiles
     }
 
-    /// Samples that every pixel has at least.
+    /// Minimum number of samples per pixel.
     #[must_use]
     pub fn samples(&self) -> u32 {
         self.tiles.iter().map(|t| t.samples).min().unwrap_or(0)
@@ -245,8 +245,8 @@ impl Film {
         sum.map(|s| s / (f64::from(self.size[0]) * f64::from(self.size[1])))
     }
 
-    /// Noise of the picture: `sqrt(mean of var / (mean^2 + 0.01 M^2))` in luminance over the pixels,
-    /// `M` the picture's mean. `None` before every pixel has two samples, or if all is black.
+    /// Noise of the picture: `sqrt(mean of var / (mean^2 + 0.01 M^2))` in luminance over the pixels, where `M` is the
+    /// picture's mean. `None` before every pixel has two samples, or if the picture is black.
     #[must_use]
     pub fn relative_error(&self) -> Option<f64> {
         if self.samples() < 2 {
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_ahead_of_the_others_counts_for_itself() {
+    fn tiles_may_have_different_numbers_of_samples() {
         let mut film = Film::new([32, 16]);
         let grey = |_: [u32; 2], _: u32| PixelSample { radiance: Rgb::WHITE, ..PixelSample::default() };
         add_pass(&mut film.tiles_mut()[1], grey);
@@ -321,7 +321,7 @@ mod tests {
 
     #[test]
     fn the_error_is_that_of_the_mean() {
-        // Samples 0 and 2 by turns: variance 1, mean 1, n = 400.
+        // Alternating samples 0 and 2: variance 1, mean 1, n = 400.
         let mut film = Film::new([16, 16]);
         for _ in 0..400 {
             add_pass(&mut film.tiles_mut()[0], |_, n| PixelSample {

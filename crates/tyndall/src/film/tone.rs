@@ -1,10 +1,10 @@
 //! Tone mapping: from scene-linear radiance to the code values of an sRGB display.
 //!
-//! A curve only shows a picture; the record of the light is the linear one.
+//! A curve is for display only; the film records linear radiance.
 
 use crate::math::Rgb;
 
-/// How radiance without an upper bound is brought into the range of a display.
+/// How unbounded radiance is compressed into the range of a display.
 ///
 /// Every curve takes linear Rec. 709 primaries and yields sRGB code values in [0, 1].
 #[derive(
@@ -12,10 +12,10 @@ use crate::math::Rgb;
 )]
 #[serde(rename_all = "lowercase")]
 pub enum ToneCurve {
-    /// `AgX`, the base look, with highlights that lose their colour as film does \[Sobotka22, Wrensch23\].
+    /// `AgX`, the base look: highlights desaturate as on film \[Sobotka22, Wrensch23\].
     #[default]
     Agx,
-    /// None: clipped at 1, then encoded as IEC 61966-2-1 says.
+    /// None: clipped at 1, then encoded according to IEC 61966-2-1.
     Linear,
     /// Luminance `L` becomes `L / (1 + L)` \[Reinhard02, eq. 3\]; saturated channels clip.
     Reinhard,
@@ -39,21 +39,21 @@ impl ToneCurve {
     }
 }
 
-/// The sRGB code value of a linear one [IEC 61966-2-1]; what lies outside [0, 1] is clipped, NaN is 0.
+/// The sRGB code value of a linear one [IEC 61966-2-1]; values outside [0, 1] are clipped, NaN becomes 0.
 #[must_use]
 pub fn encode_srgb(linear: f32) -> f32 {
     let x = clip(linear, 1.0);
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// The nearest of the 256 levels of [0, 1]; what lies outside is clipped, NaN is 0.
+/// The nearest of the 256 levels of [0, 1]; values outside are clipped, NaN becomes 0.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates, NaN becomes 0")]
 pub fn quantize(x: f32) -> u8 {
     (x * 255.0).round() as u8
 }
 
-/// The brightest scene value that a curve sees: all are flat far below it, and its square is finite.
+/// Scene values are clipped to this before a curve: all curves are flat far below it, and its square is finite.
 const BRIGHTEST: f32 = 1e10;
 
 fn expose(linear: Rgb, stops: f32) -> Rgb {
@@ -61,7 +61,7 @@ fn expose(linear: Rgb, stops: f32) -> Rgb {
     linear.map(|x| clip(x * gain, BRIGHTEST))
 }
 
-/// To [0, high]; unlike `clamp`, takes NaN to 0.
+/// Clamps to [0, high]; unlike `clamp`, maps NaN to 0.
 fn clip(x: f32, high: f32) -> f32 {
     if x > 0.0 { x.min(high) } else { 0.0 }
 }
@@ -73,7 +73,7 @@ fn aces(x: f32) -> f32 {
 
 type Matrix = [[f32; 3]; 3];
 
-/// Scene stops that `AgX` spans, as log2 of the linear value \[Sobotka22\].
+/// Range of scene values that `AgX` covers, as log2 of the linear value \[Sobotka22\].
 const AGX_STOPS: [f32; 2] = [-12.473_93, 4.026_069];
 
 /// Moves pure colours towards white, so that bright ones desaturate instead of clipping \[Wrensch23\].
@@ -83,14 +83,14 @@ const AGX_INSET: Matrix = rows_to_one([
     [0.042_375_655, 0.078_433_6, 0.879_143],
 ]);
 
-/// The way back, after the contrast curve \[Wrensch23\].
+/// The inverse matrix, applied after the contrast curve \[Wrensch23\].
 const AGX_OUTSET: Matrix = rows_to_one([
     [1.196_879, -0.098_020_88, -0.099_029_74],
     [-0.052_896_85, 1.151_903_1, -0.098_961_18],
     [-0.052_971_635, -0.098_043_45, 1.151_073_7],
 ]);
 
-/// The published rows miss a sum of one by up to 2e-4; with it, grey stays grey.
+/// Normalizes the rows: the sums of the published ones differ from 1 by up to 2e-4, and grey must stay grey.
 const fn rows_to_one(rows: Matrix) -> Matrix {
     let mut result = rows;
     let mut i = 0;
@@ -102,10 +102,10 @@ const fn rows_to_one(rows: Matrix) -> Matrix {
     result
 }
 
-/// \[Wrensch23\]'s fit of the base look of \[Sobotka22\]; the curve's output is meant for the display as it is.
+/// \[Wrensch23\]'s fit of the base look of \[Sobotka22\]; the output is already encoded for the display.
 fn agx(scene: Rgb) -> Rgb {
     let [low, high] = AGX_STOPS;
-    // log2 of zero is minus infinity, which the clamp takes to the bottom of the range.
+    // log2 of zero is minus infinity, which is clamped to the bottom of the range.
     let log = multiply(AGX_INSET, scene).map(|x| (x.log2().clamp(low, high) - low) / (high - low));
     multiply(AGX_OUTSET, log.map(agx_contrast)).map(|x| x.clamp(0.0, 1.0))
 }
@@ -159,11 +159,12 @@ mod tests {
         }
     }
 
-    /// One rounding of the `AgX` polynomial, whose coefficients add up to 95; the published rows miss grey by 7e-5.
+    /// A rounding error of the `AgX` polynomial, whose coefficients add up to 95; the published rows are off grey by
+    /// 7e-5.
     const ROUNDING: f32 = 95.0 * f32::EPSILON;
 
     #[test]
-    fn grey_stays_grey_and_grows() {
+    fn grey_stays_grey_and_monotonic() {
         for curve in CURVES {
             let mut last = 0.0;
             for step in -400_i16..400 {

@@ -1,16 +1,16 @@
-//! Sorting by the cell of a grid.
+//! Sorting items by grid cell.
 
 use super::{CellGrid, Positioned};
 use crate::math::cast;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Where each cell's items begin among those sorted by cell.
+/// The index at which each cell's items begin in the sorted order.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CellStarts(Vec<u32>);
 
 impl CellStarts {
-    /// The range of items in the cells of a row along x, from the first to the last, which lie side by side.
+    /// The range of items in the cells `x0` to `x1` of a row along x, which is contiguous.
     #[inline(always)]
     pub fn row(&self, grid: &CellGrid, [x0, x1]: [usize; 2], y: usize, z: usize) -> Range<usize> {
         let first = self.0[grid.number([x0, y, z])];
@@ -18,32 +18,32 @@ impl CellStarts {
         first as usize..end as usize
     }
 
-    /// Bytes kept.
+    /// Size in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.0[..])
     }
 }
 
-/// Items of several lists in the order of their cells, then of the lists, then as they stand in their list, so that what is
-/// added up in this order does not depend on what was computed when.
+/// Items of several lists, sorted by cell, then by list, then by position in the list, so that sums in this order do
+/// not depend on when the items were computed.
 #[derive(Debug)]
 pub(crate) struct SortedItems {
     keys: Vec<u64>,
     pub starts: CellStarts,
 }
 
-/// An item among the lists that were sorted.
+/// Where an item is in the lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ItemAddress {
     pub list: usize,
     pub index: usize,
 }
 
-/// Bits of a sorting key for the index in a list, then for the list, then for the cell.
+/// A sorting key consists, from the lowest bit, of the index in a list, the list, and the cell.
 const INDEX_BITS: u32 = 20;
 const LIST_BITS: u32 = 20;
 
-/// Bytes of an item while it is sorted.
+/// Bytes per item during sorting.
 pub(crate) const KEY_BYTES: u64 = 8;
 
 impl SortedItems {
@@ -77,12 +77,12 @@ impl SortedItems {
         Self { keys, starts: CellStarts(starts) }
     }
 
-    /// How many there are.
+    /// Number of items.
     pub fn len(&self) -> usize {
         self.keys.len()
     }
 
-    /// The items in their order.
+    /// The addresses of the items in sorted order.
     pub fn addresses(&self) -> impl IndexedParallelIterator<Item = ItemAddress> {
         self.keys.par_iter().map(|&key| ItemAddress {
             list: cast::low_u32(key >> INDEX_BITS & ((1 << LIST_BITS) - 1)) as usize,

@@ -10,8 +10,8 @@ use crate::medium::Medium;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Interactions in the order of their cells, then of lights, paths and bounces, so that sums do not depend on what was
-/// traced when. Arrays end with room for a whole vector.
+/// Interactions sorted by cell, then by light, path and bounce, so that sums do not depend on when they were traced.
+/// Arrays are padded at the end by a whole vector.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PhotonMap {
     pub(super) grid: CellGrid,
@@ -24,15 +24,15 @@ pub(super) struct PhotonMap {
     pub(super) y: Vec<f32>,
     pub(super) z: Vec<f32>,
     pub(super) directions: Vec<u32>,
-    /// Flux, over density and radius cubed.
+    /// Flux divided by density and by the radius cubed.
     pub(super) red: Vec<f32>,
     pub(super) green: Vec<f32>,
     pub(super) blue: Vec<f32>,
-    /// One over the opacity where the photon is.
+    /// Reciprocal of the opacity at the photon's position.
     pub(super) per_opacity: Vec<f32>,
 }
 
-/// Chunks of one light, with what their photons' flux is to be multiplied by.
+/// Chunks of one light, with the factor for their photons' flux.
 pub(super) struct Lit<'a> {
     pub chunks: &'a [Chunk<Photon>],
     pub scale: DVec3,
@@ -84,12 +84,12 @@ impl PhotonMap {
         map
     }
 
-    /// Bytes kept.
+    /// Size in bytes.
     pub fn bytes(&self) -> usize {
         4 * 8 * self.x.len() + self.starts.bytes()
     }
 
-    /// The range of photons in the cells of a row, which lie side by side.
+    /// The range of photons in the cells of a row, which is contiguous.
     #[inline(always)]
     pub fn row(&self, xs: [usize; 2], y: usize, z: usize) -> Range<usize> {
         self.starts.row(&self.grid, xs, y, z)
