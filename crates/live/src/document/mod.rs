@@ -155,16 +155,7 @@ impl Document {
     /// Never: tables of plain keys always have a value.
     #[must_use]
     pub fn to_value(&self) -> Value {
-        let mut value = serde_json::to_value(self).expect("tables of plain keys");
-        number::shorten(&mut value);
-        if let (Some(raw), Some(written)) = (&self.volume.raw, value.pointer_mut("/volume/raw")) {
-            // These two are in double precision, where a short decimal would be another number.
-            written["spacing"] = raw.spacing.to_vec().into();
-            if let Some(origin) = raw.origin {
-                written["origin"] = origin.to_vec().into();
-            }
-        }
-        value
+        number::to_value(self).expect("tables of plain keys")
     }
 }
 

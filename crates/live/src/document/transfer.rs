@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::shape::{Color, Fraction, FractionColor, Positive};
+use super::shape::{Color, DataValue, Fraction, FractionColor, Positive};
 
 /// What each data value looks like: a named `preset`, or `points`; without either, a preset fit to the volume's kind.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -27,7 +27,8 @@ pub struct TransferFunction {
 #[serde(deny_unknown_fields)]
 pub struct TransferPoint {
     /// Data value, in the file's meaning (CT: Hounsfield units).
-    pub value: f32,
+    #[schemars(with = "DataValue")]
+    pub value: f64,
 
     /// Share of `medium.density` that is the extinction here, from 0 to 1; not alpha per step.
     #[schemars(with = "Fraction")]
@@ -67,7 +68,7 @@ pub struct TransferPoint {
 impl TransferPoint {
     /// A point whose other quantities stand at their defaults.
     #[must_use]
-    pub fn new(value: f32, opacity: f32) -> Self {
+    pub fn new(value: f64, opacity: f32) -> Self {
         Self {
             value,
             opacity,
