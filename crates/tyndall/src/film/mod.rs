@@ -3,10 +3,14 @@
 //! It is cut into tiles that each thread has for itself, so that pixels next to each other never
 //! share a cache line across threads and each tile may be a sample ahead of another.
 
+mod estimate;
+mod tile;
 pub mod tone;
 
+pub use tile::{TILE, Tile};
+
 use crate::math::{Rgb, cast};
-use std::sync::Arc;
+use tile::{PixelEstimate, bytes_of_pixel, order};
 
 /// What one sample of a pixel found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,115 +23,12 @@ pub struct PixelSample {
     pub depth: f32,
 }
 
-/// Edge of a tile in pixels.
-pub const TILE: u32 = 16;
-
-/// Mean and scatter of the samples of one pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Pixel {
-    mean: [f32; 3],
-    /// Sum of squared deviations from the mean.
-    scatter: [f32; 3],
-    /// The same of the luminance, which the channels' own do not tell.
-    luminance_scatter: f32,
-    alpha: f32,
-    depth: f32,
-}
-
-impl Pixel {
-    /// Welford's update with the `n`-th sample, in double precision.
-    fn add(&mut self, sample: &PixelSample, n: f64) {
-        let radiance = sample.radiance.to_array();
-        let luminance = f64::from(sample.radiance.luminance());
-        let before = luminance - luminance_of(self.mean.map(f64::from));
-        for (x, (mean, scatter)) in radiance.into_iter().zip(self.mean.iter_mut().zip(&mut self.scatter)) {
-            let x = f64::from(x);
-            let (old, sum) = (f64::from(*mean), f64::from(*scatter));
-            let moved = old + (x - old) / n;
-            *mean = cast::single(moved);
-            *scatter = cast::single(sum + (x - old) * (x - moved));
-        }
-        let after = luminance - luminance_of(self.mean.map(f64::from));
-        self.luminance_scatter = cast::single(f64::from(self.luminance_scatter) + before * after);
-        let blend = |old: f32, new: f32| cast::single(f64::from(old) + (f64::from(new) - f64::from(old)) / n);
-        self.alpha = blend(self.alpha, sample.alpha);
-        self.depth = blend(self.depth, sample.depth);
-    }
-}
-
 fn luminance_of([r, g, b]: [f64; 3]) -> f64 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
-/// A square of pixels that take their samples in turn.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tile {
-    origin: [u32; 2],
-    /// Where each pixel lies in the tile: block by block of 4 x 4, so that pixels that follow each other are near.
-    order: Arc<[[u32; 2]]>,
-    samples: u32,
-    /// Pixels that have one sample more.
-    ahead: usize,
-    pixels: Vec<Pixel>,
-}
-
-/// Edge of the blocks in which a tile's pixels are ordered.
-const BLOCK: u32 = 4;
-
-impl Tile {
-    /// Samples that every pixel of the tile has.
-    #[must_use]
-    pub fn samples(&self) -> u32 {
-        self.samples
-    }
-
-    /// Pixels in it.
-    #[must_use]
-    pub fn pixel_count(&self) -> usize {
-        self.pixels.len()
-    }
-
-    /// Samples that its pixels have taken, all together.
-    #[must_use]
-    pub fn taken(&self) -> usize {
-        self.samples as usize * self.pixels.len() + self.ahead
-    }
-
-    /// The pixels that are next to take a sample, all with the same number, which comes second; at most `most`.
-    pub fn next(&self, most: usize) -> (impl ExactSizeIterator<Item = [u32; 2]>, u32) {
-        let last = self.order.len().min(self.ahead + most);
-        let [x, y] = self.origin;
-        (
-            self.order[self.ahead..last].iter().map(move |position| [x + position[0], y + position[1]]),
-            self.samples,
-        )
-    }
-
-    /// Adds the sample of the pixel whose turn it is.
-    pub fn add(&mut self, sample: &PixelSample) {
-        self.pixels[self.ahead].add(sample, f64::from(self.samples) + 1.0);
-        self.ahead += 1;
-        if self.ahead == self.pixels.len() {
-            self.samples += 1;
-            self.ahead = 0;
-        }
-    }
-
-    /// Samples of the `i`-th pixel.
-    fn samples_of(&self, i: usize) -> f64 {
-        f64::from(self.samples) + f64::from(i < self.ahead)
-    }
-}
-
-/// The order of a tile's pixels.
-fn order([width, height]: [u32; 2]) -> Arc<[[u32; 2]]> {
-    let mut positions: Vec<_> = (0..width * height).map(|i| [i % width, i / width]).collect();
-    positions.sort_by_key(|&[x, y]| (y / BLOCK, x / BLOCK, y, x));
-    positions.into()
-}
-
 /// A picture in the making.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Film {
     size: [u32; 2],
     tiles: Vec<Tile>,
@@ -156,8 +57,7 @@ impl Film {
             let origin = [i % columns * TILE, i / columns * TILE];
             let size = [0, 1].map(|a| TILE.min(size[a] - origin[a]));
             let order = if size == [TILE; 2] { whole.clone() } else { order(size) };
-            let pixels = vec![Pixel::default(); order.len()];
-            Tile { origin, order, samples: 0, ahead: 0, pixels }
+            Tile::new(origin, order)
         };
         Self { size, tiles: (0..columns * rows).map(tile).collect() }
     }
@@ -168,10 +68,10 @@ impl Film {
         size.map(|n| n.div_ceil(TILE) as usize).iter().product()
     }
 
-    /// Bytes that a film of a size keeps.
+    /// Bytes that a film of a size keeps once every pixel has so many samples.
     #[must_use]
-    pub fn bytes(size: [u32; 2]) -> u64 {
-        u64::from(size[0]) * u64::from(size[1]) * size_of::<Pixel>() as u64
+    pub fn bytes(size: [u32; 2], samples: u32) -> u64 {
+        u64::from(size[0]) * u64::from(size[1]) * bytes_of_pixel(samples) as u64
     }
 
     /// Width and height.
@@ -188,7 +88,7 @@ impl Film {
     /// Samples that every pixel has at least.
     #[must_use]
     pub fn samples(&self) -> u32 {
-        self.tiles.iter().map(|t| t.samples).min().unwrap_or(0)
+        self.tiles.iter().map(Tile::samples).min().unwrap_or(0)
     }
 
     /// Samples per pixel, averaged over the picture.
@@ -198,14 +98,8 @@ impl Film {
         taken / (f64::from(self.size[0]) * f64::from(self.size[1]))
     }
 
-    fn pixels(&self) -> impl Iterator<Item = ([u32; 2], f64, &Pixel)> {
-        self.tiles.iter().flat_map(|tile| {
-            let [x, y] = tile.origin;
-            let positions = tile.order.iter().zip(&tile.pixels).enumerate();
-            positions.map(move |(i, (position, pixel))| {
-                ([x + position[0], y + position[1]], tile.samples_of(i), pixel)
-            })
-        })
+    fn pixels(&self) -> impl Iterator<Item = PixelEstimate> {
+        self.tiles.iter().flat_map(Tile::pixels)
     }
 
     /// The picture so far.
@@ -218,7 +112,7 @@ impl Film {
             variance: vec![[f32::INFINITY; 3]; pixels],
             depth: vec![f32::INFINITY; pixels],
         };
-        for ([x, y], n, pixel) in self.pixels() {
+        for PixelEstimate { position: [x, y], samples: n, estimate: pixel } in self.pixels() {
             let i = y as usize * self.size[0] as usize + x as usize;
             let [r, g, b] = pixel.mean;
             image.rgba[i] = [r, g, b, pixel.alpha];
@@ -237,8 +131,8 @@ impl Film {
     #[must_use]
     pub fn mean_radiance(&self) -> [f64; 3] {
         let mut sum = [0.0; 3];
-        for (_, _, pixel) in self.pixels() {
-            for (sum, &x) in sum.iter_mut().zip(&pixel.mean) {
+        for pixel in self.pixels() {
+            for (sum, &x) in sum.iter_mut().zip(&pixel.estimate.mean) {
                 *sum += f64::from(x);
             }
         }
@@ -255,7 +149,7 @@ impl Film {
         let whole = luminance_of(self.mean_radiance());
         let mut sum = 0.0;
         let mut count = 0.0;
-        for (_, n, pixel) in self.pixels() {
+        for PixelEstimate { samples: n, estimate: pixel, .. } in self.pixels() {
             let variance = f64::from(pixel.luminance_scatter.max(0.0)) / (n * (n - 1.0));
             let mean = luminance_of(pixel.mean.map(f64::from));
             sum += variance / (mean * mean + 0.01 * whole * whole).max(f64::MIN_POSITIVE);
@@ -317,6 +211,54 @@ mod tests {
             film.tiles_mut().iter_mut().for_each(|t| add_pass(t, grey));
         }
         assert_eq!(film.relative_error(), Some(0.0));
+    }
+
+    /// The picture of one pixel with these samples.
+    fn of_samples(samples: impl IntoIterator<Item = f32>) -> Film {
+        let mut film = Film::new([1, 1]);
+        for x in samples {
+            film.tiles_mut()[0].add(&PixelSample { radiance: Rgb::splat(x), alpha: 1.0, depth: 3.0 * x });
+        }
+        film
+    }
+
+    /// A single precision mean that is updated sample by sample stops moving after 10^7 of them.
+    #[test]
+    fn no_sample_is_lost_after_ten_million() {
+        let (n, x) = (10_000_000, 0.1_f32);
+        let image = of_samples(std::iter::repeat_n(x, n)).image();
+        assert!((image.rgba[0][0] / x - 1.0).abs() < 1e-6, "{:?}", image.rgba);
+        assert!(image.variance[0][0] <= 1e-14, "{:?}", image.variance);
+        // The second half twice as bright.
+        let image = of_samples((0..n).map(|i| if i < n / 2 { x } else { 2.0 * x })).image();
+        assert!((image.rgba[0][0] / (1.5 * x) - 1.0).abs() < 1e-6, "{:?}", image.rgba);
+        let variance = 0.25 * x * x / n as f32;
+        assert!((image.variance[0][0] / variance - 1.0).abs() < 1e-5, "{:?}", image.variance);
+    }
+
+    /// Whatever the number of samples: between chunks, in one, and where nodes meet.
+    #[test]
+    fn chunks_and_nodes_give_the_statistics_of_all_samples() {
+        for n in [1, 2, 15, 16, 17, 63, 64, 65, 255, 256, 257, 1023, 1024, 1500] {
+            let samples =
+                || (0..n).map(|i: u32| (i.wrapping_mul(2_654_435_769) >> 8) as f32 / (1 << 24) as f32);
+            let image = of_samples(samples()).image();
+            let n = f64::from(n);
+            let mean = samples().map(f64::from).sum::<f64>() / n;
+            let scatter = samples().map(|x| (f64::from(x) - mean).powi(2)).sum::<f64>();
+            assert!((f64::from(image.rgba[0][1]) / mean - 1.0).abs() < 1e-6, "{n} samples");
+            assert!((f64::from(image.depth[0]) / (3.0 * mean) - 1.0).abs() < 1e-6, "{n} samples");
+            if n > 1.0 {
+                let variance = scatter / (n * (n - 1.0));
+                assert!((f64::from(image.variance[0][1]) / variance - 1.0).abs() < 1e-5, "{n} samples");
+            }
+        }
+    }
+
+    #[test]
+    fn a_pixels_memory_grows_with_the_logarithm_of_its_samples() {
+        let bytes = [1, 15, 16, 63, 64, 1 << 20].map(|samples| Film::bytes([1, 1], samples));
+        assert_eq!(bytes, [72, 72, 108, 108, 144, 72 + 36 * 9]);
     }
 
     #[test]
