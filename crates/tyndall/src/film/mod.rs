@@ -7,10 +7,11 @@ mod estimate;
 mod tile;
 pub mod tone;
 
-pub use tile::{TILE, Tile};
+pub use tile::{Goal, Stride, TILE, Tile};
 
 use crate::math::{Rgb, cast};
-use tile::{PixelEstimate, bytes_of_pixel, order};
+use std::sync::Arc;
+use tile::{Order, PixelEstimate, bytes_of_pixel};
 
 /// What one sample of a pixel found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,11 +53,11 @@ impl Film {
     #[must_use]
     pub fn new(size: [u32; 2]) -> Self {
         let [columns, rows] = size.map(|n| n.div_ceil(TILE));
-        let whole = order([TILE; 2]);
+        let whole = Arc::new(Order::new([TILE; 2]));
         let tile = |i: u32| {
             let origin = [i % columns * TILE, i / columns * TILE];
             let size = [0, 1].map(|a| TILE.min(size[a] - origin[a]));
-            let order = if size == [TILE; 2] { whole.clone() } else { order(size) };
+            let order = if size == [TILE; 2] { whole.clone() } else { Arc::new(Order::new(size)) };
             Tile::new(origin, order)
         };
         Self { size, tiles: (0..columns * rows).map(tile).collect() }
@@ -89,6 +90,18 @@ impl Film {
     #[must_use]
     pub fn samples(&self) -> u32 {
         self.tiles.iter().map(Tile::samples).min().unwrap_or(0)
+    }
+
+    /// Whether every tile has come as far as a goal.
+    #[must_use]
+    pub fn has_reached(&self, goal: Goal) -> bool {
+        self.tiles.iter().all(|tile| tile.has_reached(goal))
+    }
+
+    /// The coarsest stride whose pixels do not all have a sample yet; `None` if even the finest do.
+    pub(crate) fn coarse_goal(&self) -> Option<Goal> {
+        let goals = Stride::ALL.map(|stride| Goal { samples: 0, more: Some(stride) });
+        goals.into_iter().find(|&goal| !self.has_reached(goal))
     }
 
     /// Samples per pixel, averaged over the picture.
@@ -167,10 +180,8 @@ mod tests {
     fn add_pass(tile: &mut Tile, sample: impl Fn([u32; 2], u32) -> PixelSample) {
         let before = tile.samples();
         while tile.samples() == before {
-            let (mut pixels, n) = tile.next(1);
-            let pixel = pixels.next().unwrap();
-            drop(pixels);
-            tile.add(&sample(pixel, n));
+            let pixel = tile.next(Goal::samples(before + 1), 1).next().unwrap();
+            tile.add(&sample(pixel, before));
         }
     }
 
@@ -198,6 +209,31 @@ mod tests {
         assert!((image.depth[i] - 8.5).abs() < 1e-6);
         assert_eq!(film.samples(), 3);
         assert!((film.mean_radiance()[1] - 18.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_pass_goes_from_coarse_pixels_to_fine_ones() {
+        for size in [[16, 16], [37, 19], [3, 5]] {
+            let mut film = Film::new(size);
+            let inside = |at: u32, edge: u32| at < edge;
+            for more in Stride::ALL.map(Some).into_iter().chain([None]) {
+                let goal = Goal { samples: u32::from(more.is_none()), more };
+                let mut taken = 0;
+                for tile in film.tiles_mut() {
+                    while !tile.has_reached(goal) {
+                        let [x, y] = tile.next(goal, 7).next().unwrap();
+                        let step = more.map_or(1, Stride::pixels);
+                        assert!(inside(x, size[0]) && inside(y, size[1]));
+                        assert!(x % step == 0 && y % step == 0, "({x}, {y}) on the way to {goal:?}");
+                        tile.add(&PixelSample { radiance: Rgb::WHITE, ..PixelSample::default() });
+                    }
+                    assert!(tile.turn(goal).is_empty() && tile.next(goal, 7).len() == 0);
+                    taken += tile.taken();
+                }
+                let step = more.map_or(1, Stride::pixels);
+                assert_eq!(taken, size.iter().map(|edge| edge.div_ceil(step) as usize).product::<usize>());
+            }
+        }
     }
 
     #[test]

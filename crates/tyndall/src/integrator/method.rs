@@ -1,7 +1,7 @@
 //! What a method of computing light is to everything outside its folder.
 
 use super::{Limits, Stop};
-use crate::film::Tile;
+use crate::film::{Goal, Tile};
 use crate::scene::{Difference, MethodChoice, MethodSettings, Scene};
 use crate::simd::Level;
 use schemars::JsonSchema;
@@ -102,9 +102,9 @@ pub trait Method: Sized + Send + Sync + 'static {
         u32::MAX
     }
 
-    /// Adds a sample to every pixel of a tile until the tile has so many `samples`, or is told to stop. What is then half done
+    /// Adds samples to the pixels of a tile until it has come as far as `goal`, or is told to stop. What is then half done
     /// waits in `state` and is taken up by the next call, so that slices of any length get on.
-    fn refine(&self, scene: &Scene, tile: &mut Tile, state: &mut Self::TileState, samples: u32, stop: &Stop);
+    fn refine(&self, scene: &Scene, tile: &mut Tile, state: &mut Self::TileState, goal: Goal, stop: &Stop);
 
     /// What was computed and is kept; `pixels` tells how many samples the film has taken.
     fn report(&self, tiles: &[Self::TileState], pixels: &PixelCounts) -> MethodReport {

@@ -1,6 +1,6 @@
 //! A session: a scene, its integrator and the film, refined slice by slice.
 
-use crate::film::{Film, Image};
+use crate::film::{Film, Goal, Image, Stride};
 use crate::integrator::{
     Edited, Engine, KeptItems, Limits, MethodReport, PixelCounts, Resources, WorkShare, method_of,
 };
@@ -15,6 +15,8 @@ use std::time::{Duration, Instant};
 pub struct Budget {
     /// Samples that every pixel shall have in the end.
     pub samples: u32,
+    /// Pixels that shall have one sample more.
+    pub more: Option<Stride>,
     /// Point in time at which to stop; pixels that have had their turn then have a sample more than others.
     pub deadline: Option<Instant>,
     /// Raised from elsewhere to stop soon.
@@ -25,7 +27,17 @@ impl Budget {
     /// So many samples in every pixel, whatever it takes.
     #[must_use]
     pub fn samples(samples: u32) -> Self {
-        Self { samples, deadline: None, cancel: Arc::default() }
+        Self { samples, more: None, deadline: None, cancel: Arc::default() }
+    }
+
+    /// The first sample of some pixels: a coarse picture.
+    #[must_use]
+    pub fn coarse(stride: Stride) -> Self {
+        Self { more: Some(stride), ..Self::samples(0) }
+    }
+
+    fn goal(&self) -> Goal {
+        Goal { samples: self.samples, more: self.more }
     }
 }
 
@@ -170,12 +182,13 @@ impl Session {
         self.film.image()
     }
 
-    /// Works until the budget is spent, pass by pass over all tiles, so that the picture is complete as early as possible. Every
-    /// sample follows from its pixel and number, so the bits do not depend on threads or slices.
+    /// Works until the budget is spent, pass by pass over all tiles and the first pass from coarse pixels to fine ones, so that the
+    /// picture is complete as early as possible. Every sample follows from its pixel and number, so the bits do not depend on
+    /// threads or slices.
     pub fn refine(&mut self, budget: &Budget) -> Progress {
         let limits = Limits { cancel: &budget.cancel, deadline: budget.deadline };
         let Self { scene, engine, film, threads, spent, .. } = self;
-        while film.samples() < budget.samples && !limits.stop().reached() {
+        while !film.has_reached(budget.goal()) && !limits.stop().reached() {
             let so_far = film.samples();
             let begun = Instant::now();
             let prepared = threads.install(|| engine.prepare(scene, so_far, &limits));
@@ -185,9 +198,11 @@ impl Session {
             }
             // Once it delays no picture noticeably, several passes at once save threads from waiting for each other.
             let passes = (so_far / 4).clamp(1, 16).min(engine.samples_at_once());
-            let pass = so_far.saturating_add(passes).min(budget.samples);
+            let pass = Goal::samples(so_far.saturating_add(passes));
+            let next = if so_far == 0 { film.coarse_goal().unwrap_or(pass) } else { pass };
+            let goal = if next.is_beyond(budget.goal()) { budget.goal() } else { next };
             let begun = Instant::now();
-            threads.install(|| engine.refine(scene, film.tiles_mut(), pass, &limits));
+            threads.install(|| engine.refine(scene, film.tiles_mut(), goal, &limits));
             spent.sampling += begun.elapsed();
         }
         self.progress()

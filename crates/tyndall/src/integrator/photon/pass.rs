@@ -1,11 +1,11 @@
 //! Refinement passes: photons and rays of their own, which make the picture converge \[Knaus11\].
 
-use super::map::PhotonMap;
+use super::map::MapState;
 use super::settings::Settings;
 use super::stored::Photon;
 use super::view::{Stretches, View};
-use super::{plan, sorted};
-use crate::film::{PixelSample, Tile};
+use super::{make_map, plan};
+use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::cells::ChangeMarks;
 use crate::integrator::light_paths::{Ground, HistoryDetail, LightPaths, Plan, Tracing, sources};
 use crate::integrator::{Limits, Stop};
@@ -21,7 +21,7 @@ pub(super) struct Pass {
     /// Voxels.
     radius: f32,
     lights: Vec<LightPaths<Photon>>,
-    pub map: Option<PhotonMap>,
+    pub map: MapState,
 }
 
 /// Trade-off between variance and bias of successive passes, between 0 and 1: the value that \[Knaus11\] found best.
@@ -40,29 +40,36 @@ impl Pass {
         let plan =
             Plan { histories: HistoryDetail::Paths, pass: number, ..plan(scene, settings, sources.len()) };
         let lights = sources.into_iter().map(|source| LightPaths::new(source, &plan)).collect();
-        Self { number, settings: *settings, radius: settings.radius * shrunk(number), lights, map: None }
+        Self {
+            number,
+            settings: *settings,
+            radius: settings.radius * shrunk(number),
+            lights,
+            map: MapState::Absent,
+        }
     }
 
     /// Traces and sorts the photons; false where a stop came first.
     pub fn prepare(&mut self, scene: &Scene, ground: &Ground, limits: &Limits) -> bool {
-        if self.map.is_some() {
+        if self.map.ready().is_some() {
             return true;
         }
         let marks = ChangeMarks::off();
         let tracing = Tracing { scene, ground, pass: self.number, marks: &marks, limits };
-        let whole = tracing.trace(&mut self.lights).finished;
-        if whole {
-            self.map = Some(sorted(scene, self.radius, &self.settings, &self.lights));
+        let made = tracing.trace(&mut self.lights).finished
+            && make_map(&mut self.map, scene, self.radius, &self.settings, &self.lights, limits);
+        if made {
             self.lights = Vec::new();
         }
-        whole
+        made
     }
 }
 
-/// Takes a sample of every pixel of a tile, along jittered rays with jittered steps, unless a stop comes first.
+/// Takes samples of the pixels of a tile, on the way to a goal, along jittered rays with jittered steps, unless a stop comes first.
 pub(super) struct GatherPass<'a> {
     pub view: View<'a>,
     pub tile: &'a mut Tile,
+    pub goal: Goal,
     pub stop: &'a Stop<'a>,
 }
 
@@ -71,11 +78,11 @@ impl Kernel for GatherPass<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { view, tile, stop } = self;
-        let (scene, target) = (view.scene, tile.samples() + 1);
-        while tile.samples() < target {
+        let Self { view, tile, goal, stop } = self;
+        let scene = view.scene;
+        while !tile.has_reached(goal) {
             let mut stretches = Stretches::default();
-            let (pixels, sample) = tile.next(S::WIDTH);
+            let (pixels, sample) = (tile.next(goal, S::WIDTH), tile.samples());
             let count = pixels.len();
             for (lane, [x, y]) in pixels.enumerate() {
                 let pixel = y * scene.size[0] + x;

@@ -1,7 +1,7 @@
 //! View rays in segments, each by itself computed, kept and found invalid \[Jonsson12, sec. 4.3.2\].
 
 use super::view::{Notes, Stretch, Stretches, View};
-use crate::film::{PixelSample, Tile};
+use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::cells::ChangeMarks;
 use crate::integrator::history::PackedHistories;
 use crate::integrator::view_march::OPAQUE;
@@ -136,7 +136,7 @@ impl SegmentTile {
     }
 
     /// Forgets the segments that changes touch.
-    fn invalidate(&mut self, view: &View, pixels: &[[u32; 2]], positions: &ChangeMarks) {
+    fn invalidate(&mut self, view: &View, tile: &Tile, positions: &ChangeMarks) {
         let Some(changed) = self.changed.take() else { return };
         if !changed.is_empty() {
             for i in 0..self.len() {
@@ -148,9 +148,10 @@ impl SegmentTile {
         if positions.everywhere() {
             self.segments.fill(Segment::UNKNOWN);
         } else if positions.any() {
-            for (ray, segments) in self.segments.chunks_exact_mut(self.per_ray).enumerate() {
+            let pixels = tile.positions(0..tile.pixel_count());
+            for (pixel, segments) in pixels.zip(self.segments.chunks_exact_mut(self.per_ray)) {
                 if segments.iter().any(Segment::is_known) {
-                    forget_near(view, pixels[ray], positions, segments);
+                    forget_near(view, pixel, positions, segments);
                 }
             }
         }
@@ -254,12 +255,13 @@ fn forget_near(view: &View, pixel: [u32; 2], positions: &ChangeMarks, segments: 
     }
 }
 
-/// Computes the segments of a tile that show and are not known, and gives each pixel its sample, unless a
-/// stop comes first.
+/// Computes the segments that show and are not known of the pixels of a tile that a goal includes, and gives each of these
+/// pixels its sample, unless a stop comes first.
 pub(super) struct GatherSegments<'a> {
     pub view: View<'a>,
     pub segments: &'a mut SegmentTile,
     pub tile: &'a mut Tile,
+    pub goal: Goal,
     pub groups: &'a HistoryGroups,
     pub cells: &'a [Historygram],
     pub positions: &'a ChangeMarks,
@@ -271,28 +273,31 @@ impl Kernel for GatherSegments<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { view, segments, tile, groups, cells, positions, stop } = self;
-        let pixels: Vec<[u32; 2]> = tile.next(usize::MAX).0.collect();
-        segments.invalidate(&view, &pixels, positions);
+        let Self { view, segments, tile, goal, groups, cells, positions, stop } = self;
+        segments.invalidate(&view, tile, positions);
+        let turn = tile.turn(goal);
+        let pixels: Vec<[u32; 2]> = tile.positions(turn.clone()).collect();
         let rays: Vec<(Ray, Track)> = pixels.iter().map(|&pixel| ray_of(view.scene, pixel)).collect();
-        for (ray, _) in rays.iter().enumerate().filter(|(_, (_, track))| track.steps(view.step) == 0) {
-            // Past the volume.
-            let segments = &mut segments.segments[ray * segments.per_ray..(ray + 1) * segments.per_ray];
-            segments.fill(Segment::CLEAR);
+        for (ray, (_, track)) in turn.clone().zip(&rays) {
+            if track.steps(view.step) == 0 {
+                // Past the volume.
+                let segments = &mut segments.segments[ray * segments.per_ray..(ray + 1) * segments.per_ray];
+                segments.fill(Segment::CLEAR);
+            }
         }
         // Rays that lack segments, and those that still do after a packet's turn, in the order of the pixels.
-        let mut lacking: Vec<usize> =
-            (0..pixels.len()).filter(|&ray| segments.missing(ray).is_some()).collect();
+        let mut lacking: Vec<usize> = turn.clone().filter(|&ray| segments.missing(ray).is_some()).collect();
         while !lacking.is_empty() {
             for packet in lacking.chunks(S::WIDTH) {
                 let mut stretches = Stretches::default();
                 let mut numbers = [0; MOST_LANES];
                 for (lane, &ray) in packet.iter().enumerate() {
                     let segment = segments.missing(ray).unwrap_or(0);
-                    (stretches.rays[lane], stretches.tracks[lane]) = rays[ray];
-                    let count = rays[ray].1.steps(view.step);
+                    let here = ray - turn.start;
+                    (stretches.rays[lane], stretches.tracks[lane]) = rays[here];
+                    let count = rays[here].1.steps(view.step);
                     [stretches.from[lane], stretches.to[lane]] = steps_of(segment, segments.per_ray, count);
-                    stretches.due[lane] = due_in(pixels[ray], segment);
+                    stretches.due[lane] = due_in(pixels[here], segment);
                     numbers[lane] = ray * segments.per_ray + segment;
                 }
                 let bins = view.scene.medium.transfer().bins();
@@ -311,7 +316,7 @@ impl Kernel for GatherSegments<'_> {
             }
             lacking.retain(|&ray| segments.missing(ray).is_some());
         }
-        for (ray, of_ray) in rays.iter().enumerate() {
+        for (ray, of_ray) in turn.zip(&rays) {
             tile.add(&segments.composite(&view, ray, of_ray));
         }
     }
