@@ -41,20 +41,32 @@ impl Sums {
         self.depth += f64::from(sample.depth);
     }
 
-    /// The estimate from these samples, whose number is `n`.
-    pub fn estimate(&self, n: u32) -> Estimate {
-        let n = f64::from(n);
+    /// The mean radiance of these samples, whose number is `n`: that of [`Self::estimate`].
+    #[inline]
+    pub fn mean(&self, n: u32) -> [f32; 3] {
+        self.radiance.map(|sum| cast::single(sum / f64::from(n)))
+    }
+
+    /// The estimate from these samples, whose number is `count`.
+    pub fn estimate(&self, count: u32) -> Estimate {
+        let n = f64::from(count);
         // What rounding leaves of samples that are all alike may be negative.
         let scatter = |squares: f64, sum: f64| cast::single((squares - sum * sum / n).max(0.0));
         let mean = |sum: f64| cast::single(sum / n);
         Estimate {
-            mean: self.radiance.map(mean),
+            mean: self.mean(count),
             scatter: std::array::from_fn(|c| scatter(self.squares[c], self.radiance[c])),
             luminance_scatter: scatter(self.luminance_squares, luminance_of(self.radiance)),
             alpha: mean(self.alpha),
             depth: mean(self.depth),
         }
     }
+}
+
+/// The mean of all samples, of which the second mean stands for a share.
+#[inline(always)]
+pub(super) fn merged_mean(a: f32, b: f32, share: f64) -> f32 {
+    cast::single(f64::from(a) + (f64::from(b) - f64::from(a)) * share)
 }
 
 /// Means over samples and the scatter about them.
@@ -75,7 +87,7 @@ impl Estimate {
     pub fn merged(&self, n: u32, other: &Self, m: u32) -> Self {
         let (n, m) = (f64::from(n), f64::from(m));
         let share = m / (n + m);
-        let mean = |a: f32, b: f32| cast::single(f64::from(a) + (f64::from(b) - f64::from(a)) * share);
+        let mean = |a: f32, b: f32| merged_mean(a, b, share);
         let scatter = |[a, b]: [f32; 2], apart: f64| {
             cast::single(f64::from(a) + f64::from(b) + apart * apart * n * share)
         };

@@ -4,13 +4,16 @@
 //! share a cache line across threads and each tile may be a sample ahead of another.
 
 mod estimate;
+mod look;
 mod tile;
 pub mod tone;
 
+pub use look::{Tone, Viewer};
 pub use tile::{Goal, Stride, TILE, Tile};
 
 use crate::math::{Rgb, cast};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use tile::{Order, PixelEstimate, bytes_of_pixel};
 
 /// What one sample of a pixel found.
@@ -31,6 +34,8 @@ fn luminance_of([r, g, b]: [f64; 3]) -> f64 {
 /// A picture in the making.
 #[derive(Clone, Debug)]
 pub struct Film {
+    /// Tells it from every other film of this process, so that a viewer notices a new one.
+    generation: u64,
     size: [u32; 2],
     tiles: Vec<Tile>,
 }
@@ -60,7 +65,9 @@ impl Film {
             let order = if size == [TILE; 2] { whole.clone() } else { Arc::new(Order::new(size)) };
             Tile::new(origin, order)
         };
-        Self { size, tiles: (0..columns * rows).map(tile).collect() }
+        static FILMS: AtomicU64 = AtomicU64::new(1);
+        let generation = FILMS.fetch_add(1, Ordering::Relaxed);
+        Self { generation, size, tiles: (0..columns * rows).map(tile).collect() }
     }
 
     /// Tiles of a film of a size.
@@ -175,6 +182,7 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::Level;
 
     /// A sample for every pixel of a tile.
     fn add_pass(tile: &mut Tile, sample: impl Fn([u32; 2], u32) -> PixelSample) {
@@ -277,7 +285,7 @@ mod tests {
     fn chunks_and_nodes_give_the_statistics_of_all_samples() {
         for n in [1, 2, 15, 16, 17, 63, 64, 65, 255, 256, 257, 1023, 1024, 1500] {
             let samples =
-                || (0..n).map(|i: u32| (i.wrapping_mul(2_654_435_769) >> 8) as f32 / (1 << 24) as f32);
+                || (0..n).map(|i: u32| ((i + 1).wrapping_mul(2_654_435_769) >> 8) as f32 / (1 << 24) as f32);
             let image = of_samples(samples()).image();
             let n = f64::from(n);
             let mean = samples().map(f64::from).sum::<f64>() / n;
@@ -295,6 +303,74 @@ mod tests {
     fn a_pixels_memory_grows_with_the_logarithm_of_its_samples() {
         let bytes = [1, 15, 16, 63, 64, 1 << 20].map(|samples| Film::bytes([1, 1], samples));
         assert_eq!(bytes, [72, 72, 108, 108, 144, 72 + 36 * 9]);
+    }
+
+    /// A film whose tiles are apart by some samples, and of which some are in the middle of one.
+    fn uneven(size: [u32; 2], samples: u32) -> Film {
+        let mut film = Film::new(size);
+        let mut turn = 0_u32;
+        for tile in film.tiles_mut() {
+            turn += 1;
+            let more = if turn.is_multiple_of(3) { tile.pixel_count() as u32 / 2 } else { 0 };
+            let all = (samples + turn % 3) * tile.pixel_count() as u32 + more;
+            for i in 0..all {
+                let x = (i.wrapping_mul(2_654_435_769).wrapping_add(turn) >> 8) as f32 / (1 << 22) as f32;
+                tile.add(&PixelSample { radiance: Rgb::new(x, 2.0 - x, 0.3 * x), alpha: 1.0, depth: 1.0 });
+            }
+        }
+        film
+    }
+
+    #[test]
+    fn a_look_shows_what_a_file_would() {
+        let tone = Tone { curve: tone::ToneCurve::Agx, stops: 0.3 };
+        for samples in [1, 15, 16, 70, 300] {
+            let film = uneven([37, 50], samples);
+            let pixels: Vec<[f32; 3]> = film.image().rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+            let mut expected = vec![[0; 3]; pixels.len()];
+            tone.curve.encode(Level::best(), tone.stops, &pixels, &mut expected);
+            let mut viewer = Viewer::default();
+            viewer.look(&film, tone, Level::best());
+            assert_eq!((viewer.size(), viewer.changed().len()), ([37, 50], 12));
+            assert!(viewer.pixels() == expected.as_flattened(), "{samples} samples");
+        }
+    }
+
+    #[test]
+    fn a_look_renews_what_changed_and_a_missing_pixel_shows_its_blocks_first() {
+        let (tone, level) = (Tone { curve: tone::ToneCurve::Linear, stops: 0.0 }, Level::best());
+        let grey = |x: u8| PixelSample { radiance: Rgb::splat(f32::from(x) / 40.0), ..PixelSample::default() };
+        let mut film = Film::new([32, 20]);
+        let mut viewer = Viewer::default();
+        viewer.look(&film, tone, level);
+        assert!(viewer.changed().is_empty() && viewer.pixels().iter().all(|&code| code == 0));
+        // One pixel of 64, each of its own grey.
+        let coarse = Goal { samples: 0, more: Some(Stride::Eight) };
+        let mut number = 0;
+        for tile in film.tiles_mut() {
+            while !tile.has_reached(coarse) {
+                number += 1;
+                tile.add(&grey(number));
+            }
+        }
+        viewer.look(&film, tone, level);
+        assert_eq!(viewer.changed(), [[0, 0], [16, 0], [0, 16], [16, 16]]);
+        let at = |viewer: &Viewer, [x, y]: [usize; 2]| viewer.pixels()[3 * (y * 32 + x)];
+        for [x, y] in [[7, 7], [8, 7], [31, 0], [17, 19], [15, 15]] {
+            assert_eq!(at(&viewer, [x, y]), at(&viewer, [x / 8 * 8, y / 8 * 8]), "({x}, {y})");
+        }
+        assert!(at(&viewer, [0, 0]) < at(&viewer, [8, 0]) && at(&viewer, [8, 0]) < at(&viewer, [8, 8]));
+        viewer.look(&film, tone, level);
+        assert!(viewer.changed().is_empty());
+        film.tiles_mut()[3].add(&grey(40));
+        viewer.look(&film, tone, level);
+        assert_eq!(viewer.changed(), [[16, 16]]);
+        // A new film without samples keeps the old picture until it has some; another exposure renews all.
+        let before = viewer.pixels().to_vec();
+        viewer.look(&Film::new([32, 20]), tone, level);
+        assert!(viewer.changed().is_empty() && viewer.pixels() == before);
+        viewer.look(&film, Tone { stops: 1.0, ..tone }, level);
+        assert_eq!(viewer.changed().len(), 4);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A tile: the unit of work, with all that its pixels' samples add up to.
 
 use super::PixelSample;
-use super::estimate::{CHUNK, Estimate, FAN_OUT, Sums, samples_below};
+use super::estimate::{CHUNK, Estimate, FAN_OUT, Sums, merged_mean, samples_below};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -63,19 +63,27 @@ impl Goal {
 pub(super) struct Order {
     /// Positions in the tile.
     positions: Vec<[u32; 2]>,
+    size: [u32; 2],
+    /// The number in this order of each pixel, row by row.
+    numbers: Vec<u8>,
     /// The number of pixels of each stride, those of coarser ones included.
     within: [usize; 3],
 }
 
 impl Order {
     /// Of a tile of a size, whose origin in the film is a multiple of [`TILE`].
-    pub fn new([width, height]: [u32; 2]) -> Self {
+    pub fn new(size: [u32; 2]) -> Self {
+        let [width, height] = size;
         let mut positions: Vec<_> = (0..width * height).map(|i| [i % width, i / width]).collect();
         let is_in = |[x, y]: [u32; 2], stride: Stride| (x | y).is_multiple_of(stride.pixels());
         let finer = |at: [u32; 2]| Stride::ALL.iter().take_while(|&&stride| !is_in(at, stride)).count();
         positions.sort_by_key(|&[x, y]| (finer([x, y]), y / BLOCK, x / BLOCK, y, x));
         let within = Stride::ALL.map(|stride| positions.iter().filter(|&&at| is_in(at, stride)).count());
-        Self { positions, within }
+        let mut numbers = vec![0; positions.len()];
+        for (number, &[x, y]) in (0..=u8::MAX).zip(&positions) {
+            numbers[(y * width + x) as usize] = number;
+        }
+        Self { positions, size, numbers, within }
     }
 }
 
@@ -156,6 +164,16 @@ impl Tile {
         self.order.positions[pixels].iter().map(|&position| self.in_film(position))
     }
 
+    /// Position in the film of its first pixel.
+    pub(super) fn origin(&self) -> [u32; 2] {
+        self.origin
+    }
+
+    /// Width and height.
+    pub(super) fn size(&self) -> [u32; 2] {
+        self.order.size
+    }
+
     fn in_film(&self, [x, y]: [u32; 2]) -> [u32; 2] {
         [self.origin[0] + x, self.origin[1] + y]
     }
@@ -222,6 +240,23 @@ impl Tile {
         whole
     }
 
+    /// The radiance of each pixel, row by row; that of the first pixel of its block where a pixel has no sample. At least the tile's
+    /// first pixel has one.
+    pub(super) fn look(&self, radiance: &mut [[f32; 3]]) {
+        let means = [self.samples, self.samples + 1].map(|samples| Means::new(samples, self.nodes.len()));
+        let width = self.order.size[0];
+        for (i, radiance) in (0..).zip(radiance) {
+            let [x, y] = [i % width, i / width];
+            let number = |stride: u32| {
+                let mask = !(stride - 1);
+                usize::from(self.order.numbers[((y & mask) * width + (x & mask)) as usize])
+            };
+            let has_sample = |pixel: usize| self.samples > 0 || pixel < self.ahead;
+            let pixel = [1, 2, 4, 8].into_iter().map(number).find(|&pixel| has_sample(pixel)).unwrap_or(0);
+            *radiance = means[usize::from(pixel < self.ahead)].radiance(self, pixel);
+        }
+    }
+
     /// Each pixel's position in the film, number of samples and estimate.
     pub(super) fn pixels(&self) -> impl Iterator<Item = PixelEstimate> {
         self.order.positions.iter().enumerate().map(|(i, &position)| PixelEstimate {
@@ -229,6 +264,50 @@ impl Tile {
             samples: f64::from(self.samples_of(i)),
             estimate: self.estimate(i),
         })
+    }
+}
+
+/// How the parts of pixels with the same number of samples meet: see [`Tile::estimate`], whose mean this is.
+struct Means {
+    /// Levels from which a node comes, with the share of the samples so far that it stands for.
+    nodes: Vec<(usize, f64)>,
+    /// Samples of the open chunk, and their share.
+    open: (u32, f64),
+}
+
+impl Means {
+    fn new(samples: u32, levels: usize) -> Self {
+        let mut n = 0;
+        let mut share = |m: u32| {
+            n += m;
+            f64::from(m) / f64::from(n)
+        };
+        let met = |level: usize| samples / samples_below(level) % FAN_OUT * samples_below(level);
+        let nodes = (0..levels).rev().filter(|&level| met(level) > 0).map(|level| (level, share(met(level))));
+        let nodes = nodes.collect();
+        let open = samples % CHUNK;
+        Self { nodes, open: (open, if open > 0 { share(open) } else { 0.0 }) }
+    }
+
+    #[inline]
+    fn radiance(&self, tile: &Tile, pixel: usize) -> [f32; 3] {
+        let mut mean = [0.0; 3];
+        let mut add = |part: [f32; 3], share: f64| {
+            // The first part is all there is.
+            mean = if share == 1.0 {
+                part
+            } else {
+                std::array::from_fn(|c| merged_mean(mean[c], part[c], share))
+            };
+        };
+        for &(level, share) in &self.nodes {
+            add(tile.nodes[level][pixel].mean, share);
+        }
+        let (open, share) = self.open;
+        if open > 0 {
+            add(tile.open[pixel].mean(open), share);
+        }
+        mean
     }
 }
 

@@ -1,6 +1,6 @@
 //! A session: a scene, its integrator and the film, refined slice by slice.
 
-use crate::film::{Film, Goal, Image, Stride};
+use crate::film::{Film, Goal, Image, Stride, Tone, Viewer};
 use crate::integrator::{
     Edited, Engine, KeptItems, Limits, MethodReport, PixelCounts, Resources, WorkShare, method_of,
 };
@@ -180,6 +180,11 @@ impl Session {
     #[must_use]
     pub fn image(&self) -> Image {
         self.film.image()
+    }
+
+    /// Brings a viewer's picture up to date, on the session's threads.
+    pub fn look(&self, viewer: &mut Viewer, tone: Tone) {
+        self.threads.install(|| viewer.look(&self.film, tone, self.resources.level));
     }
 
     /// Works until the budget is spent, pass by pass over all tiles and the first pass from coarse pixels to fine ones, so that the

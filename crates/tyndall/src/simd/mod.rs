@@ -9,7 +9,7 @@ mod gather;
 mod math;
 
 pub(crate) use gather::Lanes;
-pub(crate) use math::{one_minus_exp, unpack_directions};
+pub(crate) use math::{exp2_unfused, log2_unfused, one_minus_exp, unpack_directions};
 
 use fearless_simd as simd;
 use std::fmt;

@@ -106,7 +106,7 @@ impl Kernel for GatherPass<'_> {
                     depth: distance * ray.direction.dot(scene.camera.view()),
                 });
             }
-            if stop.reached() {
+            if stop.reached_now() {
                 return;
             }
         }

@@ -310,7 +310,7 @@ impl Kernel for GatherSegments<'_> {
                     segments.computed.gathers += found[lane].gathers;
                 }
                 segments.computed.segments += packet.len();
-                if stop.reached() {
+                if stop.reached_now() {
                     return;
                 }
             }
