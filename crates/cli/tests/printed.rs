@@ -93,7 +93,7 @@ fn a_key_at_its_old_place_is_read_with_a_note() {
     folder.put("both.toml", format!("{SCENE}render.path.majorant_cell = 4\nmedium.majorant_cell = 8\n"));
     let Ended { status, stderr, .. } = folder.run(&["render", "../old.toml"]);
     assert_eq!(status, Some(0), "{stderr}");
-    let note = "`render.path.majorant_cell` is `medium.majorant_cell` now: it was read as that";
+    let note = "`render.path.majorant_cell` is now `medium.majorant_cell` and was read as such";
     assert_eq!(stderr, format!("tyndall: note: {note}\n"));
     let Ended { status, stderr, .. } = folder.run(&["render", "../both.toml"]);
     assert_eq!(status, Some(1), "{stderr}");

@@ -188,7 +188,7 @@ fn an_invalid_edits_file_is_refused_before_the_work() {
         (b"3", "expected a list of edits"),
         (b"[{]", "line 1"),
         (b"[{\"patch\": {}}", "expected a list of edits in JSON"),
-        (b"\xff\xfe", "no UTF-8; expected a list of edits"),
+        (b"\xff\xfe", "not UTF-8; expected a list of edits"),
         (deep.as_bytes(), "edits.json: "),
     ] {
         let files = vec![("scene.toml", SCENE.into()), ("edits.json", edits.to_vec())];

@@ -42,7 +42,7 @@ impl Damaged {
     }
 
     /// Restores the undamaged file.
-    fn mend(&self, files: &[(&str, Vec<u8>)], path: &Path) {
+    fn restore(&self, files: &[(&str, Vec<u8>)], path: &Path) {
         rewrite(path, &files[usize::from(self.file) % files.len()].1);
     }
 }
@@ -72,7 +72,7 @@ fn for_damaged(files: &[(&str, Vec<u8>)], words: &[&str], try_file: impl Fn(&Pat
         let path = damaged.put(files, words, folder);
         within_limits(|| try_file(&path));
         // Other files of the folder may refer to it.
-        damaged.mend(files, &path);
+        damaged.restore(files, &path);
     });
 }
 

@@ -1,4 +1,4 @@
-//! Memory, asked for before it is needed: no scene may end the program.
+//! Memory checks before allocation, so that no scene can end the program by exhausting memory.
 
 use crate::document::Document;
 use crate::error::LiveError;
@@ -7,7 +7,7 @@ use tyndall::integrator::{MemoryNeed, method_of};
 use tyndall::scene::Scene;
 use tyndall_formats::memory::available;
 
-/// Refuses a film for which there is no memory; `at` says what asks for it.
+/// Refuses a film that would not fit in memory; `at` begins the message.
 pub(crate) fn film(document: &Document, at: &str) -> Result<(), LiveError> {
     let size = document.film.size;
     // The film, the picture with its layers, and the encoder's copy of it.
@@ -18,22 +18,22 @@ pub(crate) fn film(document: &Document, at: &str) -> Result<(), LiveError> {
             what: format!("{} x {} pixels need", size[0], size[1]),
             needed,
             available,
-            mend: "a smaller picture",
+            fix: "a smaller picture",
         }
     })
 }
 
-/// Refuses a scene whose method may need more memory than there is; `at` says what asks for it.
+/// Refuses a scene whose method may need more memory than is available; `at` begins the message.
 pub(crate) fn method(scene: &Scene, at: &str) -> Result<(), LiveError> {
     let method = method_of(&scene.render.method);
-    let Some(MemoryNeed { bytes, key, what, mend }) = method.memory(scene) else { return Ok(()) };
+    let Some(MemoryNeed { bytes, key, what, fix }) = method.memory(scene) else { return Ok(()) };
     admit(bytes, |needed, available| LiveError::Memory {
         at: at.to_owned(),
         key: format!("render.{}.{key}", method.table()),
         what: format!("{what} may need"),
         needed,
         available,
-        mend,
+        fix,
     })
 }
 
@@ -44,7 +44,7 @@ fn admit(needed: u64, refusal: impl Fn(u64, u64) -> LiveError) -> Result<(), Liv
     }
 }
 
-/// Bytes that may be filled with what serves edits to come alone: as many as leave room for much else.
+/// Bytes that may hold data kept only to speed up later edits: an eighth of the available memory, where that is known.
 pub(crate) fn for_edits() -> usize {
     available().map_or(usize::MAX, |available| usize::try_from(available / 8).unwrap_or(usize::MAX))
 }

@@ -1,4 +1,4 @@
-//! Everything that a scene document names: its volume and its environment maps.
+//! Everything that a scene document refers to: its volume and its environment maps.
 
 use crate::document::{self, Document};
 use rayon::ThreadPool;
@@ -12,24 +12,24 @@ use tyndall::volume::{Bricks, GridError, Interpolation, Volume};
 use tyndall_formats::image::{ImageError, read_map};
 use tyndall_formats::volume::{Endian, RawLayout, ReadError, SampleType, read, read_raw};
 
-/// What a document names but does not hold.
+/// The data that a document refers to but does not contain.
 #[derive(Clone, Debug)]
 pub struct Assets {
-    /// The volume, read as the document says.
+    /// The volume, read as the document specifies.
     pub volume: Arc<Volume>,
-    /// Environment maps by the path that the document gives.
+    /// Environment maps, by path as given in the document.
     pub maps: BTreeMap<String, Arc<Map>>,
 }
 
 impl Assets {
-    /// Whether both have the very same maps.
+    /// Whether both share the same maps in memory.
     pub(crate) fn shares_maps(&self, other: &Self) -> bool {
         let same = |(path, map)| other.maps.get(path).is_some_and(|other| Arc::ptr_eq(map, other));
         self.maps.len() == other.maps.len() && self.maps.iter().all(same)
     }
 }
 
-/// What a volume's source said beside the volume.
+/// What a volume's source contained besides the volume.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Source {
@@ -37,42 +37,42 @@ pub struct Source {
     pub channels: usize,
     /// Time steps in the file.
     pub times: usize,
-    /// What a user should know.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
-/// Why an asset could not be had.
+/// Why an asset could not be loaded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AssetError {
-    /// The volume's file.
+    /// The volume's file cannot be read.
     #[error(transparent)]
     Volume(#[from] ReadError),
-    /// The procedural field.
+    /// The procedural field cannot be generated.
     #[error("`volume.procedural.size`: {0}")]
     Field(#[from] GridError),
-    /// The memory that a procedural field would take.
+    /// The procedural field would take more memory than is free.
     #[error("`volume.procedural.size`: {dims:?} voxels need {} MiB, but {} MiB are free; expected a smaller field", .needed >> 20, .available >> 20)]
     Memory {
         /// Voxels along each axis.
         dims: [usize; 3],
-        /// Bytes.
+        /// Bytes needed.
         needed: u64,
-        /// Bytes.
+        /// Bytes free.
         available: u64,
     },
-    /// An environment map's file.
+    /// An environment map's file cannot be read.
     #[error("`lights.{light}.map`: {source}")]
     MapFile {
-        /// Number of the light.
+        /// Index of the light.
         light: usize,
         /// Why.
         source: ImageError,
     },
-    /// An environment map's content.
+    /// An environment map's content is invalid.
     #[error("`lights.{light}.map`: {}: {source}", path_name(.path))]
     Map {
-        /// Number of the light.
+        /// Index of the light.
         light: usize,
         /// The file.
         path: PathBuf,
@@ -81,7 +81,7 @@ pub enum AssetError {
     },
 }
 
-/// Reads what a document names; its paths start from `folder`. In parallel on the current thread pool.
+/// Loads what a document refers to, in parallel on the current thread pool. Its paths are relative to `folder`.
 ///
 /// # Errors
 /// [`AssetError`] names the file or key.
@@ -92,8 +92,8 @@ pub fn load(document: &Document, folder: &Path) -> Result<(Assets, Source), Asse
     Ok((Assets { volume, maps }, source))
 }
 
-/// Reads what a document names that the one before an edit did not; the rest is shared with that one's assets. In
-/// parallel on a thread pool.
+/// Loads the assets of an edited document, in parallel on a thread pool: only what the document before the edit did not
+/// refer to is read; the rest is shared with that document's assets.
 ///
 /// # Errors
 /// [`AssetError`] names the file or key.
@@ -120,7 +120,7 @@ pub fn reload(
     };
     let maps = || maps(document, folder, &assets.maps);
     let all_known = document.lights.iter().flatten().all(known);
-    // To call other threads where there is nothing to read would take longer than the edit.
+    // With nothing to read, handing over to other threads would take longer than the edit.
     Ok(Assets { volume, maps: if all_known { maps() } else { threads.install(maps) }? })
 }
 
@@ -131,7 +131,7 @@ fn interpolation(document: &Document) -> Interpolation {
     }
 }
 
-/// The environment maps of a document, by the paths that it gives; those that are known are not read again.
+/// The environment maps of a document, by path as given there; those in `known` are not read again.
 fn maps(
     document: &Document,
     folder: &Path,
@@ -158,7 +158,7 @@ fn volume(described: &document::Volume, folder: &Path) -> Result<(Volume, Source
     if let Some(procedural) = &described.procedural {
         return field(procedural);
     }
-    // The document's own check demands one of both.
+    // The document's check requires one of the two.
     let path = folder.join(described.path.as_deref().unwrap_or_default());
     let loaded = match &described.raw {
         Some(raw) => read_raw(&path, &layout(raw)),

@@ -1,4 +1,4 @@
-//! From the checked document to the scene: what was left to choice is chosen here, by the volume.
+//! Builds the scene from a checked document. What the document leaves open is chosen here to suit the volume.
 
 use crate::assets::Assets;
 use crate::document::{self, Document};
@@ -17,32 +17,32 @@ use tyndall::scene::{Background, RenderSettings, Scene};
 use tyndall::transfer::{Optics, PRESETS, Point, Preset, TransferFunction};
 use tyndall::volume::{Grid, Space, Volume};
 
-/// Why a document with its assets makes no scene.
+/// Why no scene can be built from a document and its assets.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("`{path}`: {problem}")]
 pub struct SceneError {
     /// Where in the document.
     pub path: String,
-    /// What was found, what was expected, and the mend.
+    /// What was found, what was expected, and how to fix it.
     pub problem: String,
 }
 
-/// Optical thickness of a voxel beyond which single precision no longer tells collisions apart.
+/// Optical thickness of a voxel beyond which single precision can no longer distinguish the positions of collisions.
 const DENSEST: f32 = 1000.0;
 
-/// Positions beyond this leave no room for single precision.
+/// Positions farther from the volume's centre than this leave no headroom in single precision.
 const FARTHEST: f32 = 1e18;
 
 fn fault(path: impl Into<String>, problem: impl Display) -> SceneError {
     SceneError { path: path.into(), problem: problem.to_string() }
 }
 
-/// What a scene was built from, beside the scene: edited scenes share all that an edit left alone.
+/// A scene with what it was built from. An edited scene shares everything that the edit did not change.
 #[derive(Clone, Debug)]
 pub struct Built {
     /// The document.
     pub document: Document,
-    /// What it names.
+    /// The assets that it refers to.
     pub assets: Assets,
     /// The scene.
     pub scene: Scene,
@@ -52,15 +52,15 @@ impl Built {
     /// Builds the scene of a document, in parallel on a thread pool.
     ///
     /// # Errors
-    /// [`SceneError`] for what only shows beside the volume: a preset that is not there, a view
-    /// without a frame, a map that was not given.
+    /// [`SceneError`] for problems that the document's check cannot find without the volume: an unknown preset, a view
+    /// that defines no camera frame, a missing map.
     pub fn new(document: Document, assets: Assets, threads: &ThreadPool) -> Result<Self, SceneError> {
         let scene = build(&document, &assets, None, threads)?;
         Ok(Self { document, assets, scene })
     }
 
-    /// The same of an edited document. What the edit left alone is shared, so that an edit costs what it touches; the scene
-    /// equals that of [`Self::new`] to the last bit.
+    /// Builds the scene of an edited document. What the edit did not change is shared, so that an edit costs only what
+    /// it changes; the scene equals that of [`Self::new`] bit for bit.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -99,7 +99,7 @@ fn build(
     })
 }
 
-/// The medium, shared with the scene before an edit as far as that left it alone.
+/// The medium; the parts that an edit did not change are shared with the scene before it.
 fn medium(
     document: &Document,
     volume: &Arc<Volume>,
@@ -116,7 +116,7 @@ fn medium(
     let per_voxel = document.medium.density * cast::single(thinnest);
     if per_voxel > DENSEST {
         let problem = format!(
-            "{} makes an optical thickness of {per_voxel:e} per voxel; expected at most {DENSEST}, which \
+            "{} gives an optical thickness of {per_voxel:e} per voxel; expected at most {DENSEST}, which \
              is opaque within a thousandth of a voxel: lower the density or give the true spacing",
             document.medium.density
         );
@@ -129,13 +129,13 @@ fn medium(
     let settings = medium_settings(document, volume.grid())?;
     let old = before.map(|before| &*before.scene.medium);
     let build = || Medium::after(old, volume.clone(), transfer, &settings);
-    // To call other threads for what is shared anyway would take longer than the edit.
+    // If the majorants are shared, handing over to other threads would take longer than the edit.
     let cell = document.medium.majorant_cell;
     let shares_majorants = same_transfer.is_some_and(|b| b.document.medium.majorant_cell == cell);
     Ok(Arc::new(if shares_majorants { build() } else { threads.install(build) }))
 }
 
-/// The lights and the glowing matter, shared with the scene before an edit as far as that left them alone.
+/// The lights and the matter's emission; the parts that an edit did not change are shared with the scene before it.
 fn lights(
     document: &Document,
     assets: &Assets,
@@ -178,7 +178,7 @@ fn transfer(document: &Document, volume: &Volume) -> Result<TransferFunction, Sc
     } else if let Some(name) = given.and_then(|t| t.preset.as_ref()) {
         let preset = Preset::named(name).ok_or_else(|| {
             let known = PRESETS.map(|p| p.name).join(", ");
-            fault("transfer_function.preset", format!("no preset `{}`; there are {known}", excerpt(name)))
+            fault("transfer_function.preset", format!("no preset `{}`; known are {known}", excerpt(name)))
         })?;
         preset.points(volume)
     } else {
@@ -274,7 +274,7 @@ fn light(light: &document::Light, grid: &Grid, assets: &Assets) -> Result<Light,
     })
 }
 
-/// Lights that show form: a warm soft sun from the upper left of the front, a cool sky that fills.
+/// Lights that bring out shape: a warm, soft sun from the upper left in front, and a cool sky as fill light.
 fn default_lights(space: Space) -> Vec<Light> {
     let (up, front) = match space {
         Space::Anatomical => (Vec3::Z, -Vec3::Y),
@@ -308,9 +308,9 @@ fn camera(document: &Document, volume: &Volume) -> Result<Camera, SceneError> {
         let camera = fit(grid, view, up, lens, document.film.size);
         let position = camera.position();
         if !position.is_finite() || position.length() > FARTHEST {
-            let problem = format!(
-                "the volume fits only from {position} off its centre; expected a wider field of view"
-            );
+            let distance = position.length();
+            let problem =
+                format!("the volume fits only from {distance:e} away; expected a wider field of view");
             return Err(fault("camera.fov", problem));
         }
         return Ok(camera);
@@ -320,16 +320,16 @@ fn camera(document: &Document, volume: &Volume) -> Result<Camera, SceneError> {
     let view = target - position;
     if view.length() <= 1e-6 * position.length() || view.length() == 0.0 {
         let problem =
-            format!("{given_position:?} is the target; expected two different positions: move one of them");
+            format!("{given_position:?} is also the target; expected two positions: move one of them");
         return Err(fault("camera.position", problem));
     }
     let up = up.unwrap_or_else(|| {
         let up = grid.space().up();
-        // Looking straight along the world's up, any upright picture will do.
+        // In a view straight along the world's up, any direction across the view can be up.
         if up.cross(view).length() > 1e-3 * view.length() { up } else { Frame::around(up).v }
     });
     if up.cross(view).length() <= 1e-6 * up.length() * view.length() {
-        let problem = format!("{up} lies along the view {view}; expected another direction");
+        let problem = format!("{up} is along the view {view}; expected another direction");
         return Err(fault("camera.up", problem));
     }
     let lens = match given {

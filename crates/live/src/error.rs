@@ -4,22 +4,22 @@ use crate::assets::AssetError;
 use crate::build::SceneError;
 use crate::document::DocumentError;
 
-/// Why a session could not be opened, or an edit not be applied; `at` names the file, or the edit in it.
+/// Why a session could not be opened or an edit could not be applied; `at` names the file or the edit.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LiveError {
-    /// A file that cannot be read as what it should be.
+    /// A file that cannot be read, or is not of the expected kind.
     #[error("{at}: {problem}")]
     File {
         /// The file.
         at: String,
-        /// What was found, what was expected, and the mend.
+        /// What was found, what was expected, and how to fix it.
         problem: String,
     },
-    /// A picture whose metadata cannot be read; the message names it.
+    /// A picture whose metadata cannot be read; the message names the file.
     #[error("{0}")]
     Picture(String),
-    /// A document or a patch that describes no scene.
+    /// A document, or a patch to one, that does not describe a scene.
     #[error("{at}: {source}")]
     Document {
         /// Where it comes from.
@@ -27,15 +27,15 @@ pub enum LiveError {
         /// What is wrong with it.
         source: DocumentError,
     },
-    /// A volume's file, which its own message names.
+    /// A volume that cannot be loaded; the source's message names the file.
     #[error(transparent)]
     Volume(Box<AssetError>),
-    /// Something else that a document names.
+    /// Another asset that cannot be loaded.
     #[error("{at}: {source}")]
     Asset {
         /// Where the document comes from.
         at: String,
-        /// Why it cannot be had.
+        /// Why it cannot be loaded.
         source: Box<AssetError>,
     },
     /// A document that does not fit its volume.
@@ -48,22 +48,22 @@ pub enum LiveError {
     },
     /// More memory would be needed than is free.
     #[error(
-        "{at}: {key}: {what} {} MiB, but {} MiB are free; expected {mend}",
+        "{at}: {key}: {what} {} MiB, but {} MiB are free; expected {fix}",
         .needed >> 20,
         .available >> 20
     )]
     Memory {
         /// Where the document comes from.
         at: String,
-        /// The key that asks for it.
+        /// The key that sets how much is needed.
         key: String,
-        /// For what, with its verb: "5 light paths may need".
+        /// What needs the memory, with its verb: "5 light paths may need".
         what: String,
-        /// Bytes.
+        /// Bytes needed.
         needed: u64,
-        /// Bytes.
+        /// Bytes free.
         available: u64,
-        /// What would take less.
-        mend: &'static str,
+        /// What would need less.
+        fix: &'static str,
     },
 }

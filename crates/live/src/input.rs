@@ -1,4 +1,4 @@
-//! What an input file is: a scene document, a picture that carries one, or a bare volume.
+//! Input files: a scene document, a picture with one in its metadata, or a bare volume.
 
 use crate::assets::{self, AssetError, Assets, Source};
 use crate::document::{self, Document, DocumentError};
@@ -10,50 +10,51 @@ use std::path::{Path, PathBuf};
 use tyndall::message::path_name;
 use tyndall_formats::image::{Metadata, read_metadata};
 
-/// A document as it was found, before any override.
+/// A document as it was read, before any override.
 #[derive(Clone, Debug)]
 pub struct Input {
     /// The document.
     pub value: Value,
-    /// The folder that its paths start from.
+    /// The folder that its paths are relative to.
     pub folder: PathBuf,
-    /// Whether it is a volume without a scene, whose look is chosen here.
+    /// Whether the input is a volume without a scene, whose look is then chosen automatically.
     pub bare: bool,
-    /// How messages name it.
+    /// Its name in messages.
     pub name: String,
-    /// What a user should know of how it was read.
+    /// Notes for the user on how it was read.
     pub notes: Vec<String>,
 }
 
-/// A checked document with all that it names, from which a session starts.
+/// A checked document with its assets, from which a session starts.
 #[derive(Clone, Debug)]
 pub struct LoadedScene {
     /// The document.
     pub document: Document,
-    /// What it names.
+    /// The assets that it refers to.
     pub assets: Assets,
-    /// What the volume's source said beside the volume.
+    /// What the volume's source contained besides the volume.
     pub source: Source,
-    /// The document as it was written; null unless edits are to come, since that of a million lights is a gigabyte.
+    /// The document as it was written; null unless edits are expected, since with a million lights it takes a gigabyte.
     pub(crate) value: Value,
     pub(crate) folder: PathBuf,
-    /// How messages name the input.
+    /// The input's name in messages.
     pub(crate) name: String,
-    /// What a user should know of how the document was read.
+    /// Notes for the user on how the document was read.
     pub(crate) notes: Vec<String>,
 }
 
-/// Density of a bare volume times its box's diagonal: opaque matter stops light within a 200th of it.
+/// Density of a bare volume times the diagonal of its box: where opacity is 1, the mean free path is 1/200 of the
+/// diagonal.
 const BARE_THICKNESS: f32 = 200.0;
 
-/// Text documents larger than this are no scenes.
+/// The largest text document that is read, in bytes.
 const LARGEST_DOCUMENT: u64 = 256 << 20;
 
-/// Memory that a byte of text may become: a million lights were seen to take 33 times their text.
+/// Bytes of memory that a byte of text may take: a million lights took 33 times the size of their text.
 const MEMORY_PER_BYTE: u64 = 40;
 
 impl Input {
-    /// Finds out what a file is: a scene by its extension, a picture with a scene inside, or a volume.
+    /// Opens a file as what its extension says: a scene, a picture with a scene in its metadata, or else a volume.
     ///
     /// # Errors
     /// [`LiveError::File`], [`LiveError::Picture`] or [`LiveError::Document`], which name the file.
@@ -72,20 +73,20 @@ impl Input {
         Ok(input)
     }
 
-    /// A document without a file; its paths start from `folder`.
+    /// A document that is not in a file; its paths are relative to `folder`.
     #[must_use]
     pub fn of_document(value: Value, folder: &Path) -> Self {
         Self { value, folder: folder.to_owned(), bare: false, name: "scene".to_owned(), notes: Vec::new() }
     }
 
-    /// Lays a merge patch over the document.
+    /// Applies a merge patch to the document.
     ///
     /// # Errors
-    /// [`DocumentError`] if a key is there at its old place and at its new one.
+    /// [`DocumentError`] if the patch has a key at both its old and its new path.
     pub fn patch(&mut self, patch: &Value) -> Result<(), DocumentError> {
         let mut patch = patch.clone();
         self.notes.extend(document::move_old_keys(&mut patch)?);
-        // Anything but a table would become one, and the check would not find what really stands in the file.
+        // Anything but a table would become one, and the check would not see what the file really contains.
         if self.value.is_object() {
             self.value = document::apply(&self.value, &patch);
         }
@@ -95,15 +96,15 @@ impl Input {
     /// Sets one key of the document, see [`document::set()`].
     ///
     /// # Errors
-    /// As there.
+    /// As [`document::set()`].
     pub fn set(&mut self, assignment: &str) -> Result<(), DocumentError> {
         document::set(&mut self.value, assignment)
     }
 
-    /// Checks the document and reads what it names.
+    /// Checks the document and loads its assets.
     ///
     /// # Errors
-    /// [`LiveError`] with what is wrong with the document or the files.
+    /// [`LiveError`] if the document or one of the files is invalid.
     pub fn load(self, options: &Options) -> Result<LoadedScene, LiveError> {
         let Self { mut value, folder, bare, name, mut notes } = self;
         let in_document = |source| LiveError::Document { at: name.clone(), source };
@@ -119,7 +120,7 @@ impl Input {
         if density_is_free {
             document.medium.density = BARE_THICKNESS / assets.volume.grid().diagonal();
             if options.edits {
-                // Chosen by the volume, and no edit's to lose.
+                // Chosen to suit the volume; stored so that no edit loses it.
                 value = document::apply(&value, &json!({ "medium": { "density": document.medium.density } }));
             }
         }
@@ -127,11 +128,11 @@ impl Input {
     }
 }
 
-/// Why what a document names cannot be had.
+/// The error of a document's assets.
 fn of_assets(source: AssetError, at: &str) -> LiveError {
     match source {
         AssetError::Volume(_) => LiveError::Volume(Box::new(source)),
-        // Of the others each begins with a key.
+        // The other messages begin with a key.
         _ => LiveError::Asset { at: at.to_owned(), source: Box::new(source) },
     }
 }
@@ -153,11 +154,11 @@ fn of_picture(path: &Path) -> Result<Value, LiveError> {
 fn of_volume(path: &Path) -> Result<Value, LiveError> {
     let name =
         path.file_name().ok_or_else(|| file(path, "expected a file: a scene, a picture or a volume"))?;
-    let name = name.to_str().ok_or_else(|| file(path, "a name that is no Unicode; rename the file"))?;
+    let name = name.to_str().ok_or_else(|| file(path, "a name that is not Unicode; rename the file"))?;
     Ok(json!({ "volume": { "path": name } }))
 }
 
-/// Says of which file the trouble is.
+/// Adds the file's name to an error.
 fn in_file<T>(path: &Path, result: Result<T, DocumentError>) -> Result<T, LiveError> {
     result.map_err(|source| LiveError::Document { at: path_name(path), source })
 }
@@ -166,10 +167,10 @@ fn file(path: &Path, problem: impl Display) -> LiveError {
     LiveError::File { at: path_name(path), problem: problem.to_string() }
 }
 
-/// The text of a file that should be `what`.
+/// The text of a file that should be `what`, such as "a scene document".
 ///
 /// # Errors
-/// [`LiveError::File`] if it cannot be read, is no UTF-8, or is larger than any `what`.
+/// [`LiveError::File`] if it cannot be read, is not UTF-8, or is too large.
 pub fn read_text(path: &Path, what: &str) -> Result<String, LiveError> {
     let unreadable = |e: std::io::Error| file(path, format!("cannot be read: {e}; check the path"));
     let about = std::fs::metadata(path).map_err(unreadable)?;
@@ -191,6 +192,6 @@ pub fn read_text(path: &Path, what: &str) -> Result<String, LiveError> {
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
     String::from_utf8(bytes).map_err(|e| {
-        file(path, format!("byte {} is no UTF-8; expected {what} in UTF-8", e.utf8_error().valid_up_to()))
+        file(path, format!("byte {} is not UTF-8; expected {what} in UTF-8", e.utf8_error().valid_up_to()))
     })
 }

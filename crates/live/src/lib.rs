@@ -1,4 +1,4 @@
-//! Scene documents, and the live session that edits them: what the program, a viewer and a script stand on.
+//! Scene documents, and the live session that edits them: the basis of the program, a viewer or a script.
 //!
 //! A program that renders a file:
 //! ```no_run
@@ -13,7 +13,7 @@
 //!     Ok(())
 //! }
 //! ```
-//! And one that edits: only the light that the edit touched is computed again.
+//! And one that edits: only the light that the edit affected is recomputed.
 //! ```
 //! use serde_json::json;
 //! use std::path::Path;
@@ -31,7 +31,8 @@
 //! # }
 //! ```
 //!
-//! The crate knows files (through `tyndall-formats`) and the renderer (`tyndall`), but no window, server, command line or Python.
+//! The crate knows files (through `tyndall-formats`) and the renderer (`tyndall`), but no window, server, command line
+//! or Python.
 
 mod admission;
 pub mod assets;

@@ -1,24 +1,24 @@
-//! What a live session runs on.
+//! Options of a live session.
 
 use std::sync::Arc;
 use tyndall::simd::Level;
 
-/// What a live session runs on.
+/// What a live session runs on, and whether edits are expected.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Threads that load, build and render.
     pub threads: Arc<rayon::ThreadPool>,
-    /// Vector instructions.
+    /// The vector instruction set.
     pub level: Level,
-    /// Whether edits are to come, so that it pays to keep what makes them fast.
+    /// Whether edits are expected, so that data that speeds them up is kept.
     pub edits: bool,
 }
 
 impl Options {
-    /// A thread for each processor, the widest vector instructions, ready for edits.
+    /// One thread per processor, the widest vector instructions, ready for edits.
     ///
     /// # Errors
-    /// If the system gives no threads.
+    /// If the system cannot start the threads.
     pub fn new() -> Result<Self, rayon::ThreadPoolBuildError> {
         let threads = Arc::new(rayon::ThreadPoolBuilder::new().build()?);
         Ok(Self { threads, level: Level::best(), edits: true })

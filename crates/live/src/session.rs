@@ -1,4 +1,4 @@
-//! The live session: a document, what it names, its scene, and the light computed so far, under edits.
+//! The live session: a document, its assets, its scene and the light computed so far, kept up to date with edits.
 
 use crate::admission;
 use crate::assets::{self, Assets, Source};
@@ -17,21 +17,21 @@ use tyndall::integrator::{MethodReport, Resources, method_of};
 use tyndall::scene::{Difference, Scene};
 use tyndall::session::{Budget, Progress, Session};
 
-/// A scene under edit, shown as it gets better.
+/// A scene that can be edited and is rendered progressively.
 ///
-/// An edit is a JSON Merge Patch on the scene document. It redoes only the light that it touched, and the picture comes to that
-/// of a session opened with the edited document, bit for bit. An edit that fails changes nothing.
+/// An edit is a JSON Merge Patch on the scene document. Only the light that it affects is recomputed, and the picture
+/// ends up the same, bit for bit, as in a session opened with the edited document. An edit that fails changes nothing.
 pub struct LiveSession {
-    /// Folder that the document's paths start from.
+    /// Folder that the document's paths are relative to.
     folder: PathBuf,
-    /// The document as written and edited; null where no edits were expected.
+    /// The document as written and edited; null if no edits were expected.
     value: Value,
     built: Built,
     session: Session,
     undo: UndoList,
     options: Options,
     source: Source,
-    /// What the user should know of the present scene.
+    /// Notes for the user on the scene as it was opened, a sentence each.
     notes: Vec<String>,
 }
 
@@ -39,9 +39,9 @@ pub struct LiveSession {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct EditReport {
-    /// What of the scene changed.
+    /// Which parts of the scene changed.
     pub difference: Difference,
-    /// What a user should know of the scene now that was not so before, a sentence each.
+    /// Notes for the user that did not apply before the edit, a sentence each.
     pub notes: Vec<String>,
     /// Time from the patch to the edited scene.
     pub to_scene: Duration,
@@ -52,7 +52,7 @@ pub struct EditReport {
 pub struct EditSource<'a> {
     /// What error messages begin with.
     pub name: &'a str,
-    /// Consecutive edits of one gesture, such as the drag of a slider, are one step of undo; `None` for an edit of its own.
+    /// Consecutive edits of one gesture, such as the drag of a slider, are one undo step; `None` for a single edit.
     pub gesture: Option<u64>,
 }
 
@@ -64,10 +64,10 @@ impl Default for EditSource<'_> {
 }
 
 impl LiveSession {
-    /// Opens a file: a scene, a picture that carries one, or a volume, whose look is then chosen for it.
+    /// Opens a file: a scene, a picture with a scene in its metadata, or a volume, for which a look is then chosen.
     ///
     /// # Errors
-    /// [`LiveError`] with what is wrong with the file or with what it names, or that there is too little memory.
+    /// [`LiveError`] if the file or something that it refers to is invalid, or if there is too little memory.
     pub fn open(path: &Path, options: Options) -> Result<Self, LiveError> {
         Self::start(Input::open(path)?, options)
     }
@@ -80,7 +80,7 @@ impl LiveSession {
         Self::of(input.load(&options)?, options)
     }
 
-    /// Starts on what was loaded with the same options.
+    /// Starts from a scene that was loaded with the same options.
     ///
     /// # Errors
     /// As [`Self::open`].
@@ -93,7 +93,7 @@ impl LiveSession {
         Ok(Self { folder, value, built, session, undo: UndoList::default(), options, source, notes })
     }
 
-    /// Builds a scene from nothing, if there is memory for it.
+    /// Builds a scene from scratch, if there is memory for it.
     fn build(document: Document, assets: Assets, options: &Options, at: &str) -> Result<Built, LiveError> {
         admission::film(&document, at)?;
         let built = Built::new(document, assets, &options.threads)
@@ -102,8 +102,8 @@ impl LiveSession {
         Ok(built)
     }
 
-    /// A session of the same document with no light computed yet, which shares the voxels: built through the parser, as if
-    /// the document were opened anew.
+    /// A new session of the same document, which shares the voxels but has no light computed yet. The document is
+    /// parsed as if it were opened again.
     ///
     /// # Errors
     /// [`LiveError`] if there is too little memory for another one.
@@ -123,15 +123,15 @@ impl LiveSession {
         })
     }
 
-    /// Applies a merge patch to the document, and goes on with the edited scene.
+    /// Applies a merge patch to the document, and continues with the edited scene.
     ///
     /// # Errors
-    /// [`LiveError`] with what is wrong with the patched document; the session then is as it was.
+    /// [`LiveError`] with what is wrong with the patched document; the session is then unchanged.
     pub fn edit(&mut self, patch: &Value) -> Result<EditReport, LiveError> {
         self.edit_from(patch, EditSource::default())
     }
 
-    /// As [`Self::edit`], and says where the patch comes from.
+    /// As [`Self::edit`], for a patch from a given source.
     ///
     /// # Errors
     /// As [`Self::edit`].
@@ -156,11 +156,11 @@ impl LiveSession {
         Ok(report)
     }
 
-    /// Takes back the last edit that was not taken back yet, but for the camera, which stays where it is; `None` where there
+    /// Undoes the last edit that has not been undone, except for the camera, which stays where it is; `None` if there
     /// is none.
     ///
     /// # Errors
-    /// [`LiveError`], as where a file is gone that the document named then; the session then is as it was.
+    /// [`LiveError`], for example if a file that the earlier document refers to is gone; the session is then unchanged.
     pub fn undo(&mut self) -> Result<Option<EditReport>, LiveError> {
         let Some(before) = self.undo.before(&self.value) else { return Ok(None) };
         let report = self.go_to(before, "undo")?;
@@ -168,7 +168,7 @@ impl LiveSession {
         Ok(Some(report))
     }
 
-    /// Does again what [`Self::undo`] took back last; `None` where there is nothing, or an edit came since.
+    /// Redoes the edit that [`Self::undo`] undid last; `None` if there is none, or if there was another edit since.
     ///
     /// # Errors
     /// As [`Self::undo`].
@@ -179,7 +179,7 @@ impl LiveSession {
         Ok(Some(report))
     }
 
-    /// Goes on with another document; nothing changes before all of it has been found sound.
+    /// Continues with another document; nothing changes until all of it has been checked.
     fn go_to(&mut self, value: Value, at: &str) -> Result<EditReport, LiveError> {
         let begun = Instant::now();
         let (document, assets) = self.parse(value.clone(), at)?;
@@ -203,7 +203,7 @@ impl LiveSession {
         Ok(EditReport { difference, notes, to_scene })
     }
 
-    /// The document of a value, with what it names; what the present document names too is shared with it.
+    /// The document of a value, with its assets; those that the current document also has are shared.
     fn parse(&self, value: Value, at: &str) -> Result<(Document, Assets), LiveError> {
         let document = Document::from_value(value)
             .map_err(|source| LiveError::Document { at: at.to_owned(), source })?;
@@ -213,7 +213,7 @@ impl LiveSession {
         Ok((document, assets))
     }
 
-    /// Works until the budget is spent, see [`Session::refine`].
+    /// Renders until the budget is spent, see [`Session::refine`].
     pub fn refine(&mut self, budget: &Budget) -> Progress {
         self.session.refine(budget)
     }
@@ -248,37 +248,37 @@ impl LiveSession {
         &self.built.document
     }
 
-    /// The document as it was written and edited, without defaults as long as edits were expected.
+    /// The document as it was written and edited; if no edits were expected, with every default filled in.
     #[must_use]
     pub fn value(&self) -> Cow<'_, Value> {
         if self.value.is_null() { Cow::Owned(self.document().to_value()) } else { Cow::Borrowed(&self.value) }
     }
 
-    /// The folder that the document's paths start from.
+    /// The folder that the document's paths are relative to.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// What the volume's source said beside the volume.
+    /// What the volume's source contained besides the volume.
     #[must_use]
     pub fn source(&self) -> &Source {
         &self.source
     }
 
-    /// What a user should know of the scene as it was opened, a sentence each.
+    /// Notes for the user on the scene as it was opened, a sentence each.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// The session of the renderer, for what it counts.
+    /// The renderer's session, for its counters.
     #[must_use]
     pub fn session(&self) -> &Session {
         &self.session
     }
 
-    /// What was computed since the last edit, or since the beginning, and what is kept for edits to come.
+    /// What was computed since the last edit, or since the start, and what is kept for later edits.
     #[must_use]
     pub fn report(&self) -> MethodReport {
         self.session.report()
@@ -291,7 +291,7 @@ fn session_of(scene: &Scene, options: &Options) -> Session {
     Session::with_resources(scene.clone(), options.threads.clone(), resources)
 }
 
-/// What a user should know of a scene.
+/// Notes for the user on a scene.
 fn notes_of(scene: &Scene) -> Vec<String> {
     let of_method = method_of(&scene.render.method).notes(scene);
     scene.notes().into_iter().chain(of_method).map(str::to_owned).collect()

@@ -1,5 +1,5 @@
-//! Undo and redo of a document's edits. The camera stays out of both: moving it is not a step to undo, and undoing an edit does
-//! not move it.
+//! Undo and redo of a document's edits. The camera stays out of both: moving it is not a step to undo, and undoing an
+//! edit does not move it.
 
 use crate::document::CAMERA;
 use serde_json::{Map, Value};
@@ -7,8 +7,8 @@ use serde_json::{Map, Value};
 /// The most steps that are remembered.
 const MOST_STEPS: usize = 1000;
 
-/// The most memory that all steps may take, in bytes. A step that edits one point of a transfer function holds all its points
-/// twice, since merge patches replace lists whole.
+/// The most memory that all steps may take, in bytes. A step that edits one point of a transfer function holds all its
+/// points twice, since merge patches replace lists whole.
 const MOST_BYTES: usize = 64 << 20;
 
 /// The edits that can be undone and those that can be redone.
@@ -18,7 +18,7 @@ pub(crate) struct UndoList {
     future: Vec<Step>,
 }
 
-/// An edit as a pair of merge patches that know nothing of the document's schema.
+/// An edit as a pair of merge patches, which are applied without regard to the document's schema.
 #[derive(Clone, Debug)]
 struct Step {
     back: Value,
@@ -63,8 +63,8 @@ impl UndoList {
         self.forget_oldest();
     }
 
-    /// The document was written differently, such as with a default filled in, but means the same: the steps on either side now
-    /// start from the new text, and there is no new step.
+    /// Adapts to an edit that changed how the document is written, for example by filling in a default, but not what it
+    /// means: the steps before and after it now start from the new text, and no step is added.
     pub fn rewritten(&mut self, before: &Value, after: &Value) {
         if let Some(last) = self.past.last_mut() {
             *last = Step::between(&merged(before, &last.back), after, last.gesture);
@@ -78,7 +78,7 @@ impl UndoList {
         let mut bytes: usize = self.past.iter().map(Step::bytes).sum();
         let mut steps = self.past.len();
         let too_many = self.past.iter().take_while(|step| {
-            // The last step stays, however large.
+            // The newest step stays, however large.
             let much = steps > MOST_STEPS || (bytes > MOST_BYTES && steps > 1);
             (bytes, steps) = (bytes - step.bytes(), steps - 1);
             much
@@ -108,9 +108,9 @@ impl UndoList {
     }
 }
 
-/// Memory of a value, about: each entry of a list or table, with its key and text.
+/// Approximate memory of a value: each entry of a list or table, with its key and text.
 fn bytes(value: &Value) -> usize {
-    /// A table also holds a hash and a place in its index for each key.
+    /// For each key, a table also holds a hash and a slot in its index.
     const KEY: usize = size_of::<String>() + 2 * size_of::<usize>();
     let inner = match value {
         Value::String(text) => text.len(),
@@ -212,7 +212,7 @@ mod tests {
         document = undo.before(&document).unwrap();
         undo.undone();
         undo.remember(&document, &json!({ "medium": { "density": 7 }, "camera": {} }), None);
-        assert_eq!(undo.after(&document), None, "an edit ends what can be redone");
+        assert_eq!(undo.after(&document), None, "after an edit, nothing can be redone");
     }
 
     fn densities(undo: &mut UndoList, mut density: f64, edits: &[(f64, Option<u64>)]) -> Value {
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gesture_is_one_step_and_one_that_ends_where_it_began_is_none() {
+    fn a_gesture_is_one_step_and_a_gesture_that_ends_where_it_began_is_no_step() {
         let mut undo = UndoList::default();
         let mut document =
             densities(&mut undo, 1.0, &[(2.0, None), (3.0, Some(7)), (4.0, Some(7)), (5.0, Some(7))]);
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn steps_lead_through_a_document_that_was_written_differently() {
+    fn undo_and_redo_work_after_the_document_was_written_differently() {
         let lobe = |g: f64| json!({ "phase": { "type": "henyey-greenstein", "g": g } });
         let (first, short) = (lobe(0.3), json!({ "phase": { "type": "schlick" } }));
         let (long, last) = (json!({ "phase": { "type": "schlick", "k": 0.0 } }), lobe(0.5));

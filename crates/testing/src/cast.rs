@@ -1,10 +1,7 @@
 //! The number conversions that may lose bits, in one place.
 
-/// The cell among `count` that a share in [0, 1] falls into; 1 belongs to the last.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "`as` saturates, and cutting the fraction off is the purpose"
-)]
+/// Which of `count` equal cells of [0, 1] a fraction falls into; 1 belongs to the last.
+#[expect(clippy::cast_possible_truncation, reason = "`as` saturates, and truncation is the purpose")]
 pub fn cell(share: f64, count: usize) -> usize {
     ((share * count as f64) as usize).min(count - 1)
 }
@@ -15,8 +12,8 @@ pub fn single(x: f64) -> f32 {
     x as f32
 }
 
-/// A share in [0, 1] as one of 256 levels; what lies outside saturates.
-#[expect(clippy::cast_possible_truncation, reason = "`as` saturates, which is what is documented")]
+/// A fraction in [0, 1] as one of 256 levels; values outside saturate.
+#[expect(clippy::cast_possible_truncation, reason = "`as` saturates, as documented")]
 pub fn level(share: f64) -> u8 {
     (share * 255.0).round() as u8
 }

@@ -1,4 +1,4 @@
-//! Whether a sampler follows the density that it claims: chi-square tests for directions, distances and choices.
+//! Chi-square tests of whether a sampler follows its claimed density: for directions, distances and discrete choices.
 
 use crate::ROUNDING;
 use crate::cast::{cell, single};
@@ -8,15 +8,15 @@ use crate::split_mix::SplitMix;
 use std::cell::Cell;
 use std::f64::consts::TAU;
 
-/// How far the squared length of a sampled direction may be from 1: single precision after a few rotations.
+/// How far the squared length of a sampled direction may be from 1: allows for single precision after a few rotations.
 const UNIT_TOLERANCE: f64 = 1e-4;
 
-/// Standard errors by which the share of successful samples may miss the density's mass, beside
-/// [`MASS_TOLERANCE`]. Generous, because the failures are a cell of the test itself.
+/// Standard errors by which the fraction of successful samples may miss the density's integral, in addition to
+/// [`MASS_TOLERANCE`]. Generous, because failed samples are also a cell of the chi-square test.
 const MASS_STANDARD_ERRORS: f64 = 4.0;
 
-/// Share of the directions that may fall where the density is zero: single precision puts a few a last place past the
-/// edge of a lobe that ends in a jump.
+/// Fraction of the directions that may fall where the density is zero: rounding to single precision puts a few just
+/// past the edge of a lobe with a discontinuous edge.
 const EDGE_SHARE: f64 = 3e-6;
 
 /// A chi-square test: how many samples to draw and where to count them.
@@ -37,36 +37,36 @@ const EDGE_SHARE: f64 = 3e-6;
 pub struct ChiSquare {
     /// Directions to draw.
     pub samples: usize,
-    /// Rows of equal cos theta, about the z axis. Cells with much of the mass are halved again.
+    /// Rows of equal cos theta, about the z axis. Cells with a large share of the density are halved further.
     pub rows: usize,
     /// Columns of equal phi.
     pub columns: usize,
-    /// How many tests are judged together; see [`crate::sidak`].
+    /// How many tests share one significance; see [`crate::sidak`].
     pub tests: usize,
     /// Seed of the uniform numbers.
     pub seed: u64,
 }
 
 impl Default for ChiSquare {
-    /// A million samples, which see a density that is wrong by some percent in one cell of a thousand.
+    /// A million samples, which detect a density that is wrong by a few percent in one cell of a thousand.
     fn default() -> Self {
         Self { samples: 1_000_000, rows: 16, columns: 32, tests: 1, seed: 0 }
     }
 }
 
 impl ChiSquare {
-    /// One of so many tests that are judged together.
+    /// The default test, as one of `tests` that share one significance.
     #[must_use]
-    pub fn of(tests: usize) -> Self {
+    pub fn among(tests: usize) -> Self {
         Self { tests, ..Self::default() }
     }
 
     /// Tests a sampler of unit vectors against its density over solid angle, [1/sr].
     ///
-    /// `sample` makes a direction of `D` uniform numbers, or `None` if it fails. The density must integrate to the
-    /// share of samples that succeed, 1 if it never fails. Samples must not fall where the density is zero. A lobe
-    /// of a width under a degree can fall between the points of the quadrature, and then shows as mass that is
-    /// missing: give it more `rows` and `columns`, or point it at the z axis.
+    /// `sample` maps `D` uniform numbers to a direction, or to `None` if it fails. The density must integrate to the
+    /// fraction of samples that succeed, 1 if it never fails. Samples must not fall where the density is zero. A lobe
+    /// narrower than a degree can fall between the quadrature points, and is then reported as missing mass: use
+    /// more `rows` and `columns`, or point it along the z axis.
     ///
     /// # Panics
     /// If `rows` or `columns` is zero.
@@ -130,8 +130,8 @@ impl ChiSquare {
 
     /// Tests numbers against their cumulative distribution function, counted in `bins` of equal probability.
     ///
-    /// Where not every sample gives a number, as when light leaves the medium, give `f64::INFINITY` for those that
-    /// do not; they are a bin of their own, of the probability that `cdf(f64::INFINITY)` leaves to 1.
+    /// If some samples give no number, as when light leaves the medium, pass `f64::INFINITY` for those; they are
+    /// counted in a bin of their own, of probability `1 - cdf(f64::INFINITY)`.
     ///
     /// # Panics
     /// If `bins` is zero.
@@ -170,10 +170,10 @@ impl ChiSquare {
         })
     }
 
-    /// Tests how often each of a few choices was made against their probabilities.
+    /// Tests how often each of a few choices was made against its probability.
     ///
     /// # Panics
-    /// If there are not as many counts as probabilities.
+    /// If the numbers of counts and probabilities differ.
     pub fn discrete(&self, probabilities: &[f64], counts: &[u64]) -> Fit {
         let mass: f64 = probabilities.iter().sum();
         Fit::new(probabilities, counts, self.tests)
@@ -182,7 +182,7 @@ impl ChiSquare {
     }
 }
 
-/// Compares the mass of a density with the share of samples that did not fail.
+/// Compares the integral of a density with the fraction of samples that did not fail.
 fn wrong_mass(mass: f64, failed: u64, samples: usize) -> Option<Fault> {
     let expected = 1.0 - failed as f64 / samples as f64;
     let standard_error = (expected * (1.0 - expected) / samples as f64).sqrt();
@@ -191,7 +191,7 @@ fn wrong_mass(mass: f64, failed: u64, samples: usize) -> Option<Fault> {
     (!right).then_some(Fault::Mass { mass, expected, tolerance })
 }
 
-/// Counts what has no probability at all.
+/// Reports samples counted in cells of zero probability.
 fn impossible(shares: &[f64], counts: &[u64]) -> Option<Fault> {
     let count = shares.iter().zip(counts).filter(|&(&share, _)| share == 0.0).map(|(_, &count)| count).sum();
     (count > 0).then_some(Fault::Impossible(count))
@@ -203,9 +203,9 @@ fn direction(cos_theta: f64, phi: f64) -> [f32; 3] {
     [sin_theta * phi.cos(), sin_theta * phi.sin(), cos_theta].map(single)
 }
 
-/// The cos theta and phi, in [0, 2 pi), of a unit vector; `None` if it is none.
+/// The cos theta and phi, in [0, 2 pi), of a unit vector; `None` if the vector is not of unit length.
 ///
-/// Dividing by the length gives back the digits that z alone loses near the poles.
+/// Dividing by the length recovers the digits that z alone loses near the poles.
 fn spherical(w: [f32; 3]) -> Option<[f64; 2]> {
     let [x, y, z] = w.map(f64::from);
     let square = x * x + y * y + z * z;
@@ -218,13 +218,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn directions_and_angles_undo_each_other() {
+    fn directions_and_angles_are_inverse() {
         for (cos_theta, phi) in [(0.3, 1.0), (-0.7, 4.0), (1.0, 0.0), (0.0, 6.2), (0.999_999_9, 3.0)] {
             let [c, p] = spherical(direction(cos_theta, phi)).unwrap();
             assert!((c - cos_theta).abs() < 1e-7, "{c} for {cos_theta}");
             assert!(cos_theta == 1.0 || (p - phi).abs() < 1e-6, "{p} for {phi}");
         }
-        // Steps of z alone are 6e-8 wide here.
+        // Single-precision z alone has steps of 6e-8 here.
         let [c, _] = spherical(direction(1.0 - 1e-9, 0.0)).unwrap();
         assert!((1.0 - c - 1e-9).abs() < 1e-12, "{c}");
         assert_eq!(spherical([0.0, 0.0, -0.5]), None);

@@ -1,4 +1,4 @@
-//! Whether two pictures, each with its noise, are pictures of the same.
+//! Whether two noisy pictures show the same scene.
 
 use crate::failure::{Error, write};
 use crate::picture::Picture;
@@ -8,23 +8,23 @@ use std::fmt;
 use std::io;
 use std::path::Path;
 
-/// Part of the reference's mean that [`Comparison::relative_mse`] takes for the brightness of black.
+/// Fraction of the reference's mean by which [`Comparison::relative_mse`] regularizes its denominator.
 const DARKEST: f64 = 0.1;
 
 impl Picture {
-    /// Compares pixel by pixel with a reference: sharpest for local faults.
+    /// Compares pixel by pixel with a reference: most sensitive to local errors.
     ///
-    /// The variances must be those of enough samples (a hundred, more where few bright ones carry the mean), or
-    /// pixels will be farther off than a normal distribution allows.
+    /// The variances must come from enough samples (a hundred, more where a few bright ones dominate the mean), or
+    /// pixels will deviate by more than a normal distribution allows.
     ///
     /// # Panics
-    /// If the sizes differ, or a list has not one entry for each pixel.
+    /// If the sizes differ, or a list does not have one entry per pixel.
     pub fn compare<'a>(&'a self, reference: &'a Self) -> Comparison<'a> {
         self.compare_blocks(reference, 1)
     }
 
-    /// Compares means of `block` x `block` pixels: sharper for faults as wide as a block, and closer to the normal
-    /// distribution where pixels have few samples. Noise must be independent from pixel to pixel.
+    /// Compares means of `block` x `block` pixels: more sensitive to errors as wide as a block, and closer to the
+    /// normal distribution where pixels have few samples. Noise must be independent from pixel to pixel.
     ///
     /// # Panics
     /// As [`Self::compare`], and if `block` is zero.
@@ -52,16 +52,16 @@ impl Picture {
     }
 }
 
-/// Signed distance of two estimates in standard errors of their difference; infinite if one is no number.
+/// Signed difference of two estimates in standard errors of that difference; infinite if either is not finite.
 fn z(image: (f64, f64), reference: (f64, f64)) -> f64 {
-    // Both means were rounded; take the brighter one's rounding for both.
+    // Both means were rounded; use the brighter one's rounding for both.
     let rounding = ROUNDING * image.0.abs().max(reference.0.abs());
     let variance = image.1 + reference.1 + rounding * rounding;
     let z = ZTest::new(image.0 - reference.0, variance, 0.0).z();
     if z.is_nan() { f64::INFINITY } else { z }
 }
 
-/// A picture beside its reference: which pixels are farther apart than noise explains.
+/// A picture compared with its reference: which pixels differ by more than noise explains.
 #[derive(Clone, Debug)]
 #[must_use = "a verdict says nothing until `assert` or `passes` is called"]
 pub struct Comparison<'a> {
@@ -73,13 +73,13 @@ pub struct Comparison<'a> {
     pub block: usize,
     /// Blocks in a row.
     pub columns: usize,
-    /// Image less reference in standard errors, per block and channel, row by row from the top.
+    /// Image minus reference in standard errors, per block and channel, row by row from the top.
     pub z: Vec<[f64; 3]>,
-    /// The distance from 0 that no z may pass: all blocks and channels together keep [`crate::SIGNIFICANCE`].
+    /// The largest allowed `abs(z)`, chosen so that all blocks and channels together have [`crate::SIGNIFICANCE`].
     pub threshold: f64,
 }
 
-/// Where a picture is farthest from its reference.
+/// Where a picture differs most from its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Worst {
     /// Column of the block's left pixel.
@@ -88,7 +88,7 @@ pub struct Worst {
     pub y: usize,
     /// 0, 1, 2 for red, green, blue.
     pub channel: usize,
-    /// Image less reference in standard errors.
+    /// Image minus reference in standard errors.
     pub z: f64,
     /// The image's mean over the block.
     pub image: f64,
@@ -97,13 +97,13 @@ pub struct Worst {
 }
 
 impl Comparison<'_> {
-    /// Whether no block is farther from its reference than chance explains.
+    /// Whether no block differs from its reference by more than chance explains.
     #[must_use]
     pub fn passes(&self) -> bool {
         self.worst().z.abs() <= self.threshold
     }
 
-    /// The block and channel that are farthest apart.
+    /// The block and channel that differ most.
     #[must_use]
     pub fn worst(&self) -> Worst {
         let places = (0..self.z.len()).flat_map(|i| [(i, 0), (i, 1), (i, 2)]);
@@ -123,22 +123,22 @@ impl Comparison<'_> {
         }
     }
 
-    /// Share of blocks and channels that are more than `sigma` standard errors apart. Noise alone gives 0.0455
-    /// past 2 and 0.0027 past 3, less where both pictures are black.
+    /// Fraction of blocks and channels that differ by more than `sigma` standard errors. Noise alone gives 0.0455
+    /// beyond 2 and 0.0027 beyond 3, less where both pictures are black.
     #[must_use]
     pub fn blocks_past(&self, sigma: f64) -> f64 {
         let past = self.z.iter().flatten().filter(|z| z.abs() > sigma).count();
         past as f64 / (3 * self.z.len()) as f64
     }
 
-    /// Mean of the image over the mean of the reference, all channels together.
+    /// Mean of the image divided by the mean of the reference, over all channels.
     #[must_use]
     pub fn mean_ratio(&self) -> f64 {
         total(self.image) / total(self.reference)
     }
 
-    /// Mean over pixels and channels of squared difference over squared reference \[Rousselle11\], where the reference
-    /// counts as no darker than a tenth of its own mean. Contains the noise of both.
+    /// Mean over pixels and channels of squared difference over squared reference \[Rousselle11\]; the square of a
+    /// tenth of the reference's mean is added to the denominator. Includes the noise of both.
     #[must_use]
     pub fn relative_mse(&self) -> f64 {
         let channels = (3 * self.image.mean.len()) as f64;
@@ -152,20 +152,20 @@ impl Comparison<'_> {
         errors.sum::<f64>() / channels
     }
 
-    /// Panics unless the comparison [`passes`](Self::passes); then the pictures to look at are in the folder
-    /// `tyndall-failures/NAME` of the system's folder for temporary files.
+    /// Panics unless the comparison [`passes`](Self::passes), after writing the pictures to the folder
+    /// `tyndall-failures/NAME` in the system's folder for temporary files.
     ///
     /// # Panics
-    /// So it is meant.
+    /// If the comparison fails.
     #[track_caller]
     pub fn assert(&self, name: &str) {
         self.assert_in(&std::env::temp_dir().join("tyndall-failures").join(name));
     }
 
-    /// As [`Self::assert`], with a folder of one's own, such as `env!("CARGO_TARGET_TMPDIR")`.
+    /// As [`Self::assert`], but writes to a given folder, such as `env!("CARGO_TARGET_TMPDIR")`.
     ///
     /// # Panics
-    /// So it is meant.
+    /// If the comparison fails.
     #[track_caller]
     pub fn assert_in(&self, folder: &Path) {
         if self.passes() {
@@ -177,8 +177,8 @@ impl Comparison<'_> {
         }
     }
 
-    /// Writes `image.png`, `reference.png`, both at the same exposure, and `error.png`: per block the z of largest
-    /// size, from blue (image too dark) over white to red (too bright), saturated at the threshold.
+    /// Writes `image.png` and `reference.png`, both at the same exposure, and `error.png`: per block the z of largest
+    /// magnitude, from blue (image too dark) through white to red (too bright), saturated at the threshold.
     ///
     /// # Errors
     /// If the folder or a file cannot be written.

@@ -1,79 +1,79 @@
 //! Damage to files for fuzz tests: a few random edits that leave most of a valid file as it was.
 //!
-//! Random bytes never get past the first line of a reader. An edit of a valid file does, and the edits here are
-//! those that readers mind: another number where a number stood, a piece left out, doubled or moved, an early end.
+//! Random bytes are rejected at the start of a file. An edited valid file gets further, and the edits here are
+//! those that expose bugs in readers: a number replaced, a piece removed, repeated or moved, a truncated file.
 
 use bolero::TypeGenerator;
 
-/// One edit; places count modulo what there is, so that every edit fits every file.
+/// One edit; positions are taken modulo the file's length, so that every edit applies to every file.
 #[derive(Clone, Debug, TypeGenerator)]
 pub enum Edit {
-    /// Another byte.
+    /// A byte is replaced.
     Byte {
         /// Where.
         at: u32,
-        /// What stands there then.
+        /// The new byte.
         value: u8,
     },
-    /// A byte near the beginning, where headers are.
+    /// A byte near the beginning, where headers are, is replaced.
     HeadByte {
-        /// Where, within the first 512.
+        /// Where, within the first 512 bytes.
         at: u32,
-        /// What stands there then.
+        /// The new byte.
         value: u8,
     },
-    /// One bit turned over.
+    /// One bit is flipped.
     Bit {
         /// Where, counted in bits.
         at: u32,
     },
-    /// The file ends here.
+    /// The file is truncated.
     Cut {
         /// Where.
         at: u32,
     },
-    /// A piece left out.
+    /// A piece is removed.
     Remove {
         /// Where.
         at: u32,
-        /// Bytes.
+        /// Length in bytes.
         length: u8,
     },
-    /// A piece once more behind itself, some times.
+    /// Copies of a piece are inserted after it.
     Repeat {
         /// Where.
         at: u32,
-        /// Bytes.
+        /// Length in bytes.
         length: u8,
-        /// How often.
+        /// Number of copies.
         times: u8,
     },
-    /// A piece written over another place.
+    /// A piece overwrites another part of the file.
     Copy {
-        /// Where it stands.
+        /// Where the piece is.
         from: u32,
-        /// Where it goes.
+        /// Where it is written.
         to: u32,
-        /// Bytes.
+        /// Length in bytes.
         length: u8,
     },
-    /// A number in binary, of 1, 2, 4 or 8 bytes, within the first 1024 bytes.
+    /// A binary number of 1, 2, 4 or 8 bytes is written within the first 1024 bytes.
     Binary {
         /// Where.
         at: u32,
         /// Which number.
         number: u8,
-        /// How it is written.
+        /// Its width and byte order.
         width: u8,
     },
-    /// Another number in words where one stood.
+    /// A decimal number is replaced.
     Digits {
-        /// Which one, from the beginning.
+        /// Which one, counted from the beginning.
         which: u32,
-        /// Which number.
+        /// Index of the replacement in [`NUMBERS`].
         number: u8,
     },
-    /// A piece of text that means something to the reader.
+    /// A piece of text that means something to the reader is inserted.
     Word {
         /// Where.
         at: u32,
@@ -82,7 +82,7 @@ pub enum Edit {
     },
 }
 
-/// Numbers in words that readers mind.
+/// Numbers, as text, that are likely to expose bugs in readers.
 pub const NUMBERS: [&str; 32] = [
     "0",
     "-0",
@@ -119,9 +119,9 @@ pub const NUMBERS: [&str; 32] = [
 ];
 
 impl Edit {
-    /// Makes the edit; `words` are what [`Edit::Word`] puts in.
+    /// Applies the edit; `words` are what [`Edit::Word`] inserts.
     pub fn apply(&self, bytes: &mut Vec<u8>, words: &[&str]) {
-        /// Past this a file is no more broken, only slower.
+        /// A longer file finds no more bugs; it only takes longer to read.
         const LONGEST: usize = 1 << 20;
 
         let length = bytes.len();
@@ -167,7 +167,7 @@ impl Edit {
     }
 }
 
-/// A number at the edge of a type, in 1 to 8 bytes of either order.
+/// A number at the limit of a type, in 1 to 8 bytes of either byte order.
 fn binary(number: u8, width: u8) -> Vec<u8> {
     let edges = [0, 1, -1, i64::from(i16::MAX), i64::from(i32::MAX), i64::MAX, i64::MIN, 1 << 40, 1 << 20, 3];
     let floats = [f64::NAN, f64::INFINITY, -1.0, 1e308, 5e-324, 1e30];
@@ -178,7 +178,7 @@ fn binary(number: u8, width: u8) -> Vec<u8> {
         floats[which - edges.len()].to_le_bytes().to_vec()
     } else {
         let wide = floats[which - edges.len() - floats.len()];
-        // Out of range becomes infinite, which is one more number to mind.
+        // Out of range becomes infinite, which is one more number to test.
         #[expect(clippy::cast_possible_truncation, reason = "any number will do")]
         let single = wide as f32;
         single.to_le_bytes().to_vec()
@@ -202,7 +202,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_edit_fits_every_file() {
+    fn every_edit_applies_to_every_file() {
         bolero::check!().with_type::<(Vec<u8>, Vec<Edit>)>().for_each(|(bytes, edits)| {
             let mut bytes = bytes.clone();
             for edit in edits {
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_in_words_gives_way_to_another() {
+    fn a_decimal_number_is_replaced() {
         let mut bytes = b"sizes: 12 34 5".to_vec();
         Edit::Digits { which: 1, number: 13 }.apply(&mut bytes, &[]);
         assert_eq!(bytes, b"sizes: 12 4294967296 5");

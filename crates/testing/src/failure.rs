@@ -1,4 +1,4 @@
-//! The pictures to look at when a comparison fails.
+//! The pictures that are written when a comparison fails.
 
 use crate::cast::level;
 use crate::picture::Picture;
@@ -6,22 +6,22 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::path::Path;
 
-/// Share of the reference's values that are shown without clipping; a few highlights may not darken all the rest.
+/// Fraction of the reference's values that are shown without clipping, so that a few highlights do not darken the rest.
 const UNCLIPPED: f64 = 0.99;
 
 type Pixel = [u8; 3];
 
 /// How far apart two pictures are, block by block.
 pub(crate) struct Error {
-    /// Edge of a block in pixels.
+    /// Edge length of a block in pixels.
     pub block: usize,
     /// Blocks in a row.
     pub columns: usize,
-    /// Per block from -1, too dark, to 1, too bright; farther is shown as these.
+    /// Per block, from -1 (too dark) to 1 (too bright); values outside are shown as the nearer end.
     pub signed: Vec<f64>,
 }
 
-/// Writes image, reference and error into a folder, which is made if it is not there.
+/// Writes image, reference and error to a folder, which is created if it does not exist.
 pub(crate) fn write(image: &Picture, reference: &Picture, error: &Error, folder: &Path) -> io::Result<()> {
     fs::create_dir_all(folder)?;
     let white = white(reference);
@@ -61,7 +61,7 @@ fn srgb(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// From blue (-1) over white (0) to red (+1).
+/// From blue (-1) through white (0) to red (+1).
 fn diverging(signed: f64) -> Pixel {
     let faded = level(1.0 - signed.abs());
     if signed < 0.0 { [faded, faded, 255] } else { [255, faded, faded] }
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn the_curve_joins_and_ends_in_white() {
+    fn the_curve_is_continuous_and_ends_in_white() {
         assert!((srgb(0.003_130_8) - srgb(0.003_130_9)).abs() < 1e-5);
         assert!((srgb(1.0) - 1.0).abs() < 1e-12 && (srgb(0.214_041_14) - 0.5).abs() < 1e-6);
         let dark = Picture::new(2, 1, vec![[0.0; 3], [f32::NAN; 3]], None);

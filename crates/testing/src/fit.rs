@@ -1,21 +1,21 @@
-//! How well counts fit the shares that they should have: Pearson's chi-square test.
+//! How well counts fit their expected shares: Pearson's chi-square test.
 
 use crate::significance::sidak;
 use statrs::function::gamma::gamma_ur;
 use std::fmt;
 use thiserror::Error;
 
-/// Cells that expect fewer samples are pooled: below about five, counts are too far from normally distributed for
+/// Cells with fewer expected samples are pooled: below about five, counts are too far from normally distributed for
 /// the statistic to follow the chi-square distribution \[Cochran54\].
 const LEAST_EXPECTED: f64 = 5.0;
 
-/// By how much shares may miss their total: room for quadrature and single precision, far below a lost factor.
+/// How far the sum of shares may be off: allows for quadrature and single precision, but not for a missing factor.
 pub(crate) const MASS_TOLERANCE: f64 = 1e-3;
 
-/// Something wrong that needs no statistics.
+/// An error that is evident without statistics.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum Fault {
-    /// The density does not integrate to the share of samples that succeed, or the shares do not sum to 1.
+    /// The density does not integrate to the fraction of samples that succeed, or the shares do not sum to 1.
     #[error("total mass {mass:.6}, expected {expected:.6} within {tolerance:.1e}")]
     Mass {
         /// What the density integrates to, or the shares sum to.
@@ -26,51 +26,51 @@ pub enum Fault {
         tolerance: f64,
     },
     /// A density or share is negative or not a number.
-    #[error("a density or share of {0}, expected a number from 0 on")]
+    #[error("a density or share of {0}, expected a number of at least 0")]
     Density(f64),
-    /// Samples fell where the density is zero, or took a choice that has no probability.
+    /// Samples fell where the density is zero, or made a choice of zero probability.
     #[error("{0} samples fell where the density is zero")]
     Impossible(u64),
     /// Samples are not unit vectors, not numbers, or outside the range of the distribution.
-    #[error("{0} samples are no unit vectors, or no numbers of the distribution")]
+    #[error("{0} samples are not unit vectors, or not within the range of the distribution")]
     Stray(u64),
-    /// Fewer than two cells expect enough samples, so that every sampler would pass.
+    /// Fewer than two cells have enough expected samples, so every sampler would pass.
     #[error("nothing to compare: fewer than two cells expect {LEAST_EXPECTED} samples")]
     OneCell,
 }
 
-/// The cell that adds most to the statistic.
+/// The cell that contributes most to the statistic.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct WorstCell {
     pub index: usize,
-    /// Its place in words.
+    /// Its position, as text.
     pub place: String,
     pub expected: f64,
     pub count: u64,
 }
 
-/// Verdict on counts against expected counts.
+/// The result of comparing counts with expected counts.
 #[derive(Clone, Debug, PartialEq)]
 #[must_use = "a verdict says nothing until `assert` or `passes` is called"]
 pub struct Fit {
     /// Pearson's statistic: the sum of `(count - expected)^2 / expected` over the pooled cells.
     pub statistic: f64,
-    /// Pooled cells, less one.
+    /// Number of pooled cells minus one.
     pub degrees_of_freedom: usize,
-    /// Probability of so large a statistic, if the code is right.
+    /// Probability of a statistic at least this large, if the code is right.
     pub p_value: f64,
     /// The p-value below which the fit is rejected.
     pub significance: f64,
-    /// What is wrong already without statistics.
+    /// An error that is evident without statistics.
     pub fault: Option<Fault>,
     pub(crate) worst: Option<WorstCell>,
 }
 
 impl Fit {
-    /// Compares counts with shares of their total; the shares are taken to sum to 1, whatever they sum to.
+    /// Compares counts with shares of their total; the shares are first scaled to sum to 1.
     ///
     /// # Panics
-    /// If there are not as many counts as shares.
+    /// If the numbers of counts and shares differ.
     pub(crate) fn new(shares: &[f64], counts: &[u64], tests: usize) -> Self {
         assert_eq!(shares.len(), counts.len(), "as many counts as shares");
         let mass: f64 = shares.iter().sum();
@@ -97,7 +97,7 @@ impl Fit {
         Self { statistic, degrees_of_freedom, p_value, significance: sidak(tests), fault, worst }
     }
 
-    /// Says where the worst cell lies.
+    /// Describes where the worst cell is.
     pub(crate) fn placed(mut self, place: impl Fn(usize) -> String) -> Self {
         if let Some(worst) = &mut self.worst {
             worst.place = place(worst.index);
@@ -105,7 +105,7 @@ impl Fit {
         self
     }
 
-    /// Puts a fault first, as the reason for what else may be wrong.
+    /// Gives `fault` precedence over any fault found so far, which it may have caused.
     pub(crate) fn with_fault(mut self, fault: Option<Fault>) -> Self {
         self.fault = fault.or(self.fault);
         if self.fault.is_some() {
@@ -123,7 +123,7 @@ impl Fit {
     /// Panics unless the fit [`passes`](Self::passes).
     ///
     /// # Panics
-    /// So it is meant.
+    /// If the fit fails.
     #[track_caller]
     pub fn assert(&self) {
         assert!(self.passes(), "{self}");
@@ -145,7 +145,7 @@ impl fmt::Display for Fit {
     }
 }
 
-/// Cells of (expected, counted), smallest first, joined until each expects enough.
+/// Cells of (expected, counted), smallest first, merged until each expects at least [`LEAST_EXPECTED`].
 fn pool(expected: &[f64], counts: &[u64]) -> Vec<(f64, f64)> {
     let mut cells: Vec<(f64, f64)> = expected.iter().zip(counts).map(|(&e, &c)| (e, c as f64)).collect();
     cells.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -156,15 +156,15 @@ fn pool(expected: &[f64], counts: &[u64]) -> Vec<(f64, f64)> {
             _ => pools.push(cell),
         }
     }
-    // Only the last pool can still be too small, and then it is the only one: cells come in growing order.
+    // Only the last pool can still be too small, and then it is the only one: cells come in increasing order.
     pools.retain(|pool| pool.0 >= LEAST_EXPECTED);
     pools
 }
 
-/// Probability that a chi-square distributed number reaches `statistic`.
+/// Probability that a chi-square distributed number is at least `statistic`.
 fn tail(degrees_of_freedom: usize, statistic: f64) -> f64 {
     match statistic {
-        // Counts that meet their expectation exactly; the incomplete gamma function is not given there.
+        // Counts that equal their expectation exactly; the incomplete gamma function is not defined there.
         0.0 => 1.0,
         _ if statistic.is_finite() => gamma_ur(0.5 * degrees_of_freedom as f64, 0.5 * statistic),
         _ => 0.0,
@@ -190,14 +190,14 @@ mod tests {
     }
 
     #[test]
-    fn rare_cells_are_pooled_until_they_count() {
+    fn rare_cells_are_pooled_until_large_enough() {
         let pools = pool(&[3.0, 100.0, 0.0, 1.0, 3.0, 50.0], &[2, 90, 0, 4, 1, 60]);
         assert_eq!(pools, [(7.0, 7.0), (50.0, 60.0), (100.0, 90.0)]);
         assert!(pool(&[1.0, 2.0], &[1, 2]).is_empty());
     }
 
     #[test]
-    fn what_needs_no_statistics_is_a_fault() {
+    fn errors_evident_without_statistics_are_faults() {
         let fault = |shares: &[f64], counts: &[u64]| Fit::new(shares, counts, 1).fault;
         assert_eq!(fault(&[1.5, -0.5], &[1000, 0]), Some(Fault::Density(-0.5)));
         assert_eq!(fault(&[1.0], &[1000]), Some(Fault::OneCell));

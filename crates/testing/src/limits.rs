@@ -1,19 +1,20 @@
-//! What a program may take for one input.
+//! Limits on the time and memory spent on one input.
 
 use std::time::{Duration, Instant};
 
-/// A broken file is refused in well under a second; the rest is for machines that do other work besides.
+/// A broken file is rejected in well under a second; the rest allows for busy machines.
 const LONGEST: Duration = Duration::from_secs(5);
 
 /// Memory for one small input, in bytes.
 const MOST_MEMORY: u64 = 1 << 30;
 
-/// Runs `work` and holds it to 5 seconds and, on Linux, to 1 GiB of the process's resident memory.
+/// Runs `work` and checks that it takes less than 5 seconds and, on Linux, that the process's resident memory stays
+/// below 1 GiB.
 ///
 /// # Panics
-/// If it takes more of either.
+/// If it exceeds either.
 pub fn within_limits<T>(work: impl FnOnce() -> T) -> T {
-    // Sets the peak back to what is resident now; where the system refuses, peaks of the past count too.
+    // Resets the peak to what is resident now; where the system refuses, earlier peaks count too.
     drop(std::fs::write("/proc/self/clear_refs", "5"));
     let begun = Instant::now();
     let done = work();
@@ -25,7 +26,7 @@ pub fn within_limits<T>(work: impl FnOnce() -> T) -> T {
     done
 }
 
-/// The largest resident memory of this process in bytes; `None` where the system does not tell.
+/// The largest resident memory of this process in bytes; `None` where the system does not report it.
 fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -36,7 +37,7 @@ fn peak_memory() -> Option<u64> {
 mod tests {
     use super::*;
 
-    // One test, since the memory is that of the whole process.
+    // A single test, since the memory is that of the whole process.
     #[test]
     #[cfg(target_os = "linux")]
     #[should_panic(expected = "MiB, expected at most 1024")]

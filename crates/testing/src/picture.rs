@@ -1,11 +1,11 @@
-//! A picture as an estimate, with its noise.
+//! A picture as a noisy estimate.
 
 /// A picture as an estimate: the mean of the samples of each pixel, and how uncertain this mean is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Pixels in a row.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
     /// Linear RGB, row by row from the top.
     pub mean: Vec<[f32; 3]>,
@@ -17,7 +17,7 @@ impl Picture {
     /// From its parts.
     ///
     /// # Panics
-    /// If a list has not one entry for each pixel, or there is no pixel.
+    /// If a list does not have one entry per pixel, or there are no pixels.
     #[must_use]
     pub fn new(width: usize, height: usize, mean: Vec<[f32; 3]>, variance: Option<Vec<[f32; 3]>>) -> Self {
         let picture = Self { width, height, mean, variance };
@@ -25,7 +25,7 @@ impl Picture {
         picture
     }
 
-    /// Mean and variance of the mean of a block of pixels, cut at the picture's edge.
+    /// Mean and variance of the mean of a block of pixels, clipped at the picture's edge.
     pub(crate) fn block(&self, x: usize, y: usize, size: usize, channel: usize) -> (f64, f64) {
         let (mut mean, mut variance, mut pixels) = (0.0, 0.0, 0.0);
         for row in y..(y + size).min(self.height) {

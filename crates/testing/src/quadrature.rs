@@ -1,11 +1,11 @@
 //! Adaptive quadrature in one and two dimensions, for the known answers that estimators are tested against.
 //!
-//! Each piece is integrated by the 15-point Kronrod rule; its difference from the 7-point Gauss rule inside bounds
-//! the error, and the worst piece is halved until all errors together are small enough \[Piessens83\]. Kinks, jumps
-//! and narrow peaks are met by ever smaller pieces. A peak that falls between all points of the first rule is
-//! not seen: split the range where a peak is known to be.
+//! Each piece is integrated by the 15-point Kronrod rule; its difference from the embedded 7-point Gauss rule bounds
+//! the error, and the worst piece is halved until the total error is small enough \[Piessens83\]. Kinks, jumps
+//! and narrow peaks are resolved by ever smaller pieces. A peak that falls between all points of the first rule is
+//! missed: split the range where a peak is known to be.
 
-/// Positive abscissae of the Kronrod rule on [-1, 1], outermost first; those at odd places are the Gauss rule's.
+/// Positive abscissae of the Kronrod rule on [-1, 1], outermost first; those at odd indices are the Gauss rule's.
 const ABSCISSAE: [f64; 7] = [
     0.991_455_371_120_812_6,
     0.949_107_912_342_758_5,
@@ -32,17 +32,17 @@ const KRONROD: ([f64; 7], f64) = (
 const GAUSS: ([f64; 3], f64) =
     ([0.129_484_966_168_869_7, 0.279_705_391_489_276_64, 0.381_830_050_505_118_9], 0.417_959_183_673_469_4);
 
-/// The inner integral of a double one must be this much better, or the outer one would chase its errors.
+/// The inner integral of a double one has this fraction of the tolerance, or the outer one would refine its errors.
 const INNER_SHARE: f64 = 0.1;
 
-/// The error that is small enough, the greater of the two, and the effort to get there.
+/// The largest acceptable error, the greater of `absolute` and `relative`, and the most work allowed to reach it.
 #[derive(Clone, Copy, Debug)]
 pub struct Tolerance {
     /// In units of the integral.
     pub absolute: f64,
     /// As a share of the integral's value.
     pub relative: f64,
-    /// Pieces after which a range counts as too hard. A jump takes about 50, one for each bit of its place.
+    /// Number of pieces after which to give up. A jump takes about 50, one for each bit of its position.
     pub most_pieces: usize,
 }
 
@@ -55,18 +55,18 @@ impl Default for Tolerance {
 
 impl Tolerance {
     fn allows(self, integral: Integral) -> bool {
-        // An infinite error is within a share of an infinite value, but no answer.
+        // An infinite error is within a share of an infinite value, but that is no answer.
         integral.error.is_finite()
             && integral.error <= self.absolute.max(self.relative * integral.value.abs())
     }
 }
 
-/// An integral and how far it may be off.
+/// An integral and its possible error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Integral {
     /// The value.
     pub value: f64,
-    /// Estimate of its error, as a rule far too high.
+    /// Estimate of its error, usually far too high.
     pub error: f64,
 }
 
@@ -78,8 +78,8 @@ pub struct Integral {
 /// ```
 ///
 /// # Panics
-/// If the tolerance is not reached: `f` is not finite, or computed in single precision (its rounding looks like
-/// endless detail; [`integrate_to`] takes a wider tolerance).
+/// If the tolerance is not reached: `f` is not finite, or is computed in single precision (its rounding looks like
+/// endless detail; [`integrate_to`] accepts a wider tolerance).
 #[track_caller]
 #[must_use]
 pub fn integrate(f: impl Fn(f64) -> f64, range: [f64; 2]) -> f64 {
@@ -96,13 +96,13 @@ pub fn integrate_2d(f: impl Fn(f64, f64) -> f64, x: [f64; 2], y: [f64; 2]) -> f6
     reached(integrate_2d_to(Tolerance::default(), f, x, y))
 }
 
-/// Integral of `f` over a range; the error tells whether the tolerance was reached.
+/// Integral of `f` over a range; its error shows whether the tolerance was reached.
 #[must_use]
 pub fn integrate_to(tolerance: Tolerance, f: impl Fn(f64) -> f64, range: [f64; 2]) -> Integral {
     adapt(tolerance, |x| Integral { value: f(x), error: 0.0 }, range)
 }
 
-/// Integral of `f(x, y)` over a rectangle: over `y` inside, over `x` outside.
+/// Integral of `f(x, y)` over a rectangle: `y` is the inner integral, `x` the outer.
 #[must_use]
 pub fn integrate_2d_to(
     tolerance: Tolerance,
@@ -130,7 +130,7 @@ fn reached(integral: Integral) -> f64 {
     integral.value
 }
 
-/// Halves the worst piece until the errors of the rule itself are small enough.
+/// Halves the worst piece until the rule's own error is small enough.
 fn adapt(tolerance: Tolerance, f: impl Fn(f64) -> Integral, range: [f64; 2]) -> Integral {
     let mut pieces = vec![Piece::new(&f, range)];
     loop {
@@ -156,13 +156,13 @@ fn adapt(tolerance: Tolerance, f: impl Fn(f64) -> Integral, range: [f64; 2]) -> 
     }
 }
 
-/// A part of the range under one application of the rule.
+/// A part of the range, integrated by one application of the rule.
 struct Piece {
     range: [f64; 2],
     value: f64,
     /// Difference between the two rules.
     error: f64,
-    /// What the integrand's own errors add up to.
+    /// The integral of the integrand's own error.
     inherited: f64,
 }
 
@@ -202,7 +202,7 @@ mod tests {
             let power = |x: f64| Integral { value: x.powi(degree), error: 0.0 };
             let piece = Piece::new(power, [-1.0, 1.0]);
             assert!((piece.value - exact).abs() < 1e-15, "degree {degree}: {} for {exact}", piece.value);
-            // Gauss with 7 points is exact up to degree 13, so only from 14 on do the two differ.
+            // Gauss with 7 points is exact up to degree 13, so the two rules differ only from 14 on.
             assert_eq!(piece.error > 1e-8, degree > 13, "degree {degree}: {}", piece.error);
         }
     }
@@ -225,11 +225,11 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_integrated_is_said() {
+    fn a_failed_integration_is_reported() {
         let pole = integrate_to(Tolerance::default(), |x| 1.0 / (x - 0.3).powi(2), [0.0, 1.0]);
         assert!(!Tolerance::default().allows(pole), "{pole:?}");
         assert!(integrate_to(Tolerance::default(), |_| f64::NAN, [0.0, 1.0]).error.is_nan());
-        // The error of the inner integral reaches the outer one.
+        // The error of the inner integral is passed on to the outer one.
         let inner = integrate_2d_to(Tolerance::default(), |_, y| 1.0 / y, [0.0, 1.0], [0.0, 1.0]);
         assert!(!Tolerance::default().allows(inner), "{inner:?}");
     }

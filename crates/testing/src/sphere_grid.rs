@@ -1,26 +1,26 @@
-//! The sphere in cells of (cos theta, phi), each with its share of a density.
+//! The sphere divided into cells of (cos theta, phi), each with its share of a density.
 
 use crate::cast::cell;
 use crate::quadrature::{Tolerance, integrate_2d_to};
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Cells with more than this many times the mean share are halved. A peaked lobe would otherwise lie in a handful
-/// of cells, and its shape inside them go untested.
+/// Cells with more than this many times the mean share are halved. A peaked lobe would otherwise fall in a handful
+/// of cells, and its shape inside them would go untested.
 const HEAVY: f64 = 2.0;
 
-/// How often a cell is halved at most; ends the halving where the whole mass sits in a point.
+/// How many times a cell is halved at most; stops the halving where all the mass is at one point.
 const MOST_HALVINGS: usize = 24;
 
-/// Wanted error of a cell's share. With a million samples it would move the statistic by 0.1, while the statistic
+/// Target error of a cell's share. With a million samples it would move the statistic by 0.1, while the statistic
 /// itself varies by 25 and more.
 const RELATIVE_ERROR: f64 = 3e-4;
 
-/// Pieces of a cell's range. A density in single precision is noise at the end, which no number of pieces smooths;
-/// what is left in a cell after its halvings needs few.
+/// Pieces of a cell's range. The last digits of a density in single precision are noise, which more pieces do not
+/// smooth; what varies in a cell after its halvings needs few.
 const MOST_PIECES: usize = 8;
 
-/// Cells of equal solid angle, the heavy ones halved again and again.
+/// Cells of equal solid angle, the heavy ones halved repeatedly.
 pub struct SphereGrid {
     rows: usize,
     columns: usize,
@@ -34,7 +34,7 @@ struct Node {
     halves: Option<Halves>,
 }
 
-/// Where a cell was halved; its two halves lie one after the other.
+/// Where a cell was halved; its two halves are consecutive nodes.
 #[derive(Clone, Copy)]
 struct Halves {
     axis: usize,
@@ -60,7 +60,7 @@ impl Cell {
 }
 
 impl SphereGrid {
-    /// Integrates a density over solid angle, given for (cos theta, phi), over each cell.
+    /// Integrates a density over solid angle, as a function of (cos theta, phi), over each cell.
     pub fn new(rows: usize, columns: usize, density: impl Fn(f64, f64) -> f64) -> Self {
         let mean_share = 1.0 / (rows * columns) as f64;
         let tolerance = Tolerance {
@@ -109,12 +109,12 @@ impl SphereGrid {
         self.halve_heavy(first + 1, heavy, halvings - 1, share);
     }
 
-    /// Number of cells that were ever made, halved ones included.
+    /// Number of cells, including those that were halved.
     pub fn len(&self) -> usize {
         self.nodes.len()
     }
 
-    /// The cell that holds a direction, given by cos theta in [-1, 1] and phi in [0, 2 pi].
+    /// The cell that contains a direction, given by cos theta in [-1, 1] and phi in [0, 2 pi].
     pub fn find(&self, cos_theta: f64, phi: f64) -> usize {
         let row = cell(0.5 * (cos_theta + 1.0), self.rows);
         let mut node = row * self.columns + cell(phi / TAU, self.columns);
@@ -142,7 +142,7 @@ mod tests {
     use super::*;
     use std::f64::consts::PI;
 
-    /// Henyey-Greenstein about the pole; in cos theta, and integrated over phi.
+    /// Henyey-Greenstein about the pole, per solid angle.
     fn henyey_greenstein(g: f64, cos_theta: f64) -> f64 {
         0.25 / PI * (1.0 - g * g) / (1.0 + g * g - 2.0 * g * cos_theta).powf(1.5)
     }

@@ -2,14 +2,14 @@
 
 /// The `SplitMix64` generator \[Steele14\]: small, sound enough for the tests here, and the same on every machine.
 ///
-/// Of its own, so that a test of a renderer's sampler does not lean on that renderer's numbers.
+/// Separate from the renderer's generator, so that a test of its sampler does not depend on its random numbers.
 #[derive(Clone, Debug)]
 pub struct SplitMix {
     state: u64,
 }
 
 impl SplitMix {
-    /// A stream for each seed.
+    /// The stream of a seed.
     #[must_use]
     pub const fn new(seed: u64) -> Self {
         Self { state: seed }

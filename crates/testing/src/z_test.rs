@@ -1,10 +1,10 @@
-//! Whether an estimate is the number that it should be.
+//! Whether an estimate agrees with its expected value.
 
 use crate::ROUNDING;
 use crate::significance::{sidak, two_sided};
 use std::fmt;
 
-/// Running mean and variance of numbers as they come \[Welford62\].
+/// Running mean and variance of a sequence of numbers \[Welford62\].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mean {
     count: u64,
@@ -14,7 +14,7 @@ pub struct Mean {
 }
 
 impl Mean {
-    /// Takes one more number in.
+    /// Adds a number.
     pub fn push(&mut self, x: f64) {
         self.count += 1;
         let distance = x - self.mean;
@@ -22,7 +22,7 @@ impl Mean {
         self.scatter += distance * (x - self.mean);
     }
 
-    /// Takes in all numbers that another one has seen \[Chan83\].
+    /// Adds all numbers that were added to `other` \[Chan83\].
     pub fn merge(&mut self, other: &Self) {
         let count = self.count + other.count;
         if count == 0 {
@@ -35,7 +35,7 @@ impl Mean {
         self.count = count;
     }
 
-    /// How many numbers came.
+    /// How many numbers were added.
     #[must_use]
     pub const fn count(&self) -> u64 {
         self.count
@@ -59,7 +59,7 @@ impl Mean {
         self.variance() / self.count as f64
     }
 
-    /// This mean beside the value that it should have.
+    /// This mean, to be tested against its expected value.
     #[must_use]
     pub fn against(&self, expected: f64) -> ZTest {
         ZTest::new(self.mean, self.variance_of_mean(), expected)
@@ -80,19 +80,19 @@ impl FromIterator<f64> for Mean {
     }
 }
 
-/// An estimate beside the value that it should have.
+/// An estimate to be tested against its expected value.
 ///
 /// The estimate must be the mean of enough numbers to be normally distributed: a hundred for well-behaved ones,
-/// many more where rare large ones carry the mean.
+/// many more where rare large ones dominate the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ZTest {
     /// The estimate.
     pub mean: f64,
     /// Standard deviation of the estimate.
     pub standard_error: f64,
-    /// The value that it should have.
+    /// Its expected value.
     pub expected: f64,
-    /// How many tests are judged together; see [`sidak`].
+    /// How many tests share one significance; see [`sidak`].
     pub tests: usize,
 }
 
@@ -103,41 +103,41 @@ impl ZTest {
         Self { mean, standard_error: variance_of_mean.sqrt(), expected, tests: 1 }
     }
 
-    /// One of so many tests that are judged together.
+    /// The same test, as one of `tests` that share one significance.
     #[must_use]
-    pub const fn of(self, tests: usize) -> Self {
+    pub const fn among(self, tests: usize) -> Self {
         Self { tests, ..self }
     }
 
-    /// Signed distance from the expected value in standard errors, which include [`ROUNDING`].
+    /// Signed difference from the expected value in standard errors, which include [`ROUNDING`].
     #[must_use]
     pub fn z(&self) -> f64 {
         let distance = self.mean - self.expected;
         if !self.standard_error.is_finite() {
-            // Anything would agree with an estimate of unlimited error.
+            // Anything would agree with an estimate of infinite error.
             return f64::NAN;
         }
         if distance == 0.0 {
-            // Not 0 / 0 where there is no error either.
+            // Avoids 0 / 0 where the error is zero too.
             return 0.0;
         }
         distance / self.standard_error.hypot(ROUNDING * self.expected)
     }
 
-    /// Probability of an estimate at least so far off, if the code is right.
+    /// Probability of an estimate at least this far off, if the code is right.
     #[must_use]
     pub fn p_value(&self) -> f64 {
         two_sided(self.z())
     }
 
-    /// Whether the estimate is no farther off than chance explains. It never is when a number is not finite.
+    /// Whether the estimate is no farther off than chance explains. False if any number is not finite.
     #[must_use]
     pub fn passes(&self) -> bool {
         self.p_value() >= sidak(self.tests)
     }
 
-    /// Whether the estimate is sharp, its standard error at most the share `relative` of the expected value, and
-    /// right, at most `standard_errors` of them away. Nothing but an exact 0 is sharp about 0.
+    /// Whether the estimate is precise (its standard error is at most `relative` times the expected value) and
+    /// accurate (it is at most `standard_errors` away). If 0 is expected, the standard error must be exactly 0.
     #[must_use]
     pub fn is_within(&self, standard_errors: f64, relative: f64) -> bool {
         self.is_sharp(relative) && self.z().abs() <= standard_errors
@@ -146,7 +146,7 @@ impl ZTest {
     /// Panics unless the test [`passes`](Self::passes).
     ///
     /// # Panics
-    /// So it is meant.
+    /// If the test fails.
     #[track_caller]
     pub fn assert(&self) {
         assert!(
@@ -160,14 +160,14 @@ impl ZTest {
     /// Panics unless the estimate [`is_within`](Self::is_within).
     ///
     /// # Panics
-    /// So it is meant.
+    /// If it is not.
     #[track_caller]
     pub fn assert_within(&self, standard_errors: f64, relative: f64) {
         assert!(
             self.is_sharp(relative),
-            "{self}; too noisy to tell: the standard error may be {relative:e} of the expected value at most"
+            "{self}; too noisy to tell: the standard error may be at most {relative:e} of the expected value"
         );
-        assert!(self.is_within(standard_errors, relative), "{self}; allowed is {standard_errors}");
+        assert!(self.is_within(standard_errors, relative), "{self}; allowed {standard_errors}");
     }
 
     fn is_sharp(&self, relative: f64) -> bool {
@@ -177,7 +177,7 @@ impl ZTest {
 
 impl fmt::Display for ZTest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // Two digits of the error, and as many places of the rest.
+        // Two digits of the error, and as many decimal places of the other numbers.
         let places = match self.standard_error.log10().floor() {
             magnitude if magnitude.is_finite() => {
                 (0..=17).find(|&p| f64::from(p) >= 1.0 - magnitude).unwrap_or(17)
@@ -234,7 +234,7 @@ mod tests {
         let p_values: Vec<f64> = (0..10_000).map(&mut p_value).collect();
         ChiSquare::default().against_cdf(p_values.iter().copied(), |p| p.clamp(0.0, 1.0), 20).assert();
         let rejected = p_values.iter().filter(|&&p| p < 0.01).count();
-        // 100 in the mean, with a standard deviation of 10.
+        // 100 on average, with a standard deviation of 10.
         assert!((70..=130).contains(&rejected), "{rejected} of 10000");
     }
 
@@ -243,9 +243,9 @@ mod tests {
         ZTest::new(1.02, 1e-4, 1.0).assert();
         assert!(!ZTest::new(1.05, 1e-4, 1.0).passes());
         assert!(!ZTest::new(0.95, 1e-4, 1.0).passes());
-        // Three standard errors are too many for one test, and nothing among a thousand.
+        // Three standard errors are too many for one test, and unremarkable among a thousand.
         let off = ZTest::new(1.03, 1e-4, 1.0);
-        assert!(!off.passes() && off.of(1000).passes());
+        assert!(!off.passes() && off.among(1000).passes());
     }
 
     #[test]
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn without_noise_only_rounding_is_granted() {
+    fn without_noise_only_rounding_is_allowed() {
         assert!(ZTest::new(0.5 + 1e-8, 0.0, 0.5).is_within(3.0, 1e-3));
         assert!(!ZTest::new(0.5 + 1e-5, 0.0, 0.5).is_within(3.0, 1e-3));
         assert!(ZTest::new(0.0, 0.0, 0.0).is_within(3.0, 1e-3));
@@ -272,10 +272,10 @@ mod tests {
     }
 
     #[test]
-    fn acceptance_wants_both_sharpness_and_truth() {
+    fn acceptance_needs_both_precision_and_accuracy() {
         ZTest::new(1.0025, 1e-6, 1.0).assert_within(3.0, 1e-3);
-        assert!(!ZTest::new(1.0035, 1e-6, 1.0).is_within(3.0, 1e-3), "right by 3.5 standard errors");
-        assert!(!ZTest::new(1.0, 1.1e-6, 1.0).is_within(3.0, 1e-3), "sharp to 1.05e-3");
+        assert!(!ZTest::new(1.0035, 1e-6, 1.0).is_within(3.0, 1e-3), "off by 3.5 standard errors");
+        assert!(!ZTest::new(1.0, 1.1e-6, 1.0).is_within(3.0, 1e-3), "precise to 1.05e-3 only");
     }
 
     #[test]

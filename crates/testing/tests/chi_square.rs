@@ -1,10 +1,10 @@
-//! The chi-square test must pass what is right, one time in a hundred excepted, and reject what is slightly wrong.
+//! The chi-square test must pass a correct sampler, except one time in a hundred, and reject a slightly wrong one.
 
 use std::f32::consts::TAU;
 use std::f64::consts::PI;
 use tyndall_testing::{ChiSquare, Fault, SplitMix};
 
-/// Henyey-Greenstein about an axis, written as the textbook has it.
+/// Henyey-Greenstein about an axis, in its textbook form.
 fn henyey_greenstein(g: f32, axis: [f32; 3]) -> impl FnMut([f32; 2]) -> Option<[f32; 3]> {
     move |[a, b]| {
         let part = (1.0 - g * g) / (1.0 - g + 2.0 * g * a);
@@ -23,7 +23,7 @@ fn henyey_greenstein_pdf(g: f64, axis: [f32; 3]) -> impl Fn([f32; 3]) -> f64 {
     }
 }
 
-/// Two unit vectors across an axis that is not along x.
+/// Two unit vectors perpendicular to an axis that is not along x.
 fn across([x, y, z]: [f32; 3]) -> [[f32; 3]; 2] {
     let length = y.hypot(z);
     let s = [0.0, z / length, -y / length];
@@ -33,7 +33,7 @@ fn across([x, y, z]: [f32; 3]) -> [[f32; 3]; 2] {
 const POLE: [f32; 3] = [0.0, 0.0, 1.0];
 const OBLIQUE: [f32; 3] = [0.48, -0.6, 0.64];
 
-/// Cosine-weighted directions about z by rejection: fails for the share of the square outside the disk.
+/// Cosine-weighted directions about z by rejection: fails in the part of the square outside the disk.
 fn cosine_by_rejection([a, b]: [f32; 2]) -> Option<[f32; 3]> {
     let (x, y) = (2.0 * a - 1.0, 2.0 * b - 1.0);
     let square = x * x + y * y;
@@ -48,7 +48,7 @@ fn cosine_pdf(w: [f32; 3]) -> f64 {
 fn peaked_lobes_pass_in_any_direction() {
     let cases = [0.5_f32, -0.8, 0.95, 0.99].map(|g| [POLE, OBLIQUE].map(|axis| (g, axis)));
     for (g, axis) in cases.into_iter().flatten() {
-        let test = ChiSquare::of(8);
+        let test = ChiSquare::among(8);
         test.directions(henyey_greenstein(g, axis), henyey_greenstein_pdf(f64::from(g), axis)).assert();
     }
 }
@@ -61,7 +61,7 @@ fn a_density_in_single_precision_passes() {
             let square = 1.0 + g * g - 2.0 * g * cos_theta;
             f64::from((1.0 - g * g) / (2.0 * TAU * square * square.sqrt()))
         };
-        ChiSquare::of(2).directions(henyey_greenstein(g, OBLIQUE), pdf).assert();
+        ChiSquare::among(2).directions(henyey_greenstein(g, OBLIQUE), pdf).assert();
     }
 }
 
@@ -79,7 +79,7 @@ fn a_slightly_wrong_density_is_rejected() {
 
 #[test]
 fn the_shape_inside_a_peak_is_tested() {
-    // The inner third of the lobe drawn evenly: within one cell of the undivided grid.
+    // The inner third of the lobe is sampled uniformly: within one cell of the undivided grid.
     let mut sample = henyey_greenstein(0.95, POLE);
     let edge = 0.999_f32;
     let flattened = move |[a, b, c]: [f32; 3]| {
@@ -94,12 +94,12 @@ fn the_shape_inside_a_peak_is_tested() {
 }
 
 #[test]
-fn failed_samples_are_a_cell() {
+fn failed_samples_are_counted_as_a_cell() {
     let share = PI / 4.0;
     ChiSquare::default().directions(cosine_by_rejection, |w| share * cosine_pdf(w)).assert();
     let forgotten = ChiSquare::default().directions(cosine_by_rejection, cosine_pdf);
     assert!(matches!(forgotten.fault, Some(Fault::Mass { .. })), "{forgotten}");
-    // Three failures more in a thousand are within the tolerance of the mass, so only the cell sees them.
+    // Three more failures in a thousand are within the tolerance of the mass, so only the cell detects them.
     let fails_more = |[a, b, c]: [f32; 3]| if c < 0.003 { None } else { cosine_by_rejection([a, b]) };
     let fit = ChiSquare { rows: 2, columns: 2, ..ChiSquare::default() }
         .directions(fails_more, |w| share * cosine_pdf(w));
@@ -123,7 +123,7 @@ fn mass_density_and_directions_are_checked() {
 }
 
 #[test]
-fn a_rare_sample_where_none_can_be_is_seen() {
+fn a_rare_sample_at_zero_density_is_detected() {
     let disk = |[a, b]: [f32; 2]| {
         let (sin, phi) = (a.sqrt(), TAU * b);
         [sin * phi.cos(), sin * phi.sin(), (1.0 - a).sqrt()]
@@ -144,9 +144,9 @@ fn correct_samplers_are_rejected_one_time_in_a_hundred() {
     });
     let p_values: Vec<f64> = p_values.collect();
     let rejected = p_values.iter().filter(|&&p| p < 0.01).count();
-    // 2 in the mean; 8 or more come one time in a thousand.
+    // 2 on average; 8 or more occur one time in a thousand.
     assert!(rejected < 8, "{rejected} of 200");
-    // No lack of rejections either: the p-values are uniform.
+    // Nor are there too few rejections: the p-values are uniform.
     ChiSquare::default().against_cdf(p_values, |p| p.clamp(0.0, 1.0), 10).assert();
 }
 
@@ -163,7 +163,7 @@ fn distances_that_end_in_the_medium_and_those_that_leave_it() {
     let cdf = |t: f64| 1.0 - (-sigma_t * t.min(depth)).exp();
     ChiSquare::default().against_cdf(draw(sigma_t), cdf, 50).assert();
     assert!(!ChiSquare::default().against_cdf(draw(1.02 * sigma_t), cdf, 50).passes());
-    // Right within the medium, but too few leave it.
+    // Correct within the medium, but too few leave it.
     let kept = draw(sigma_t).enumerate().filter(|(i, t)| t.is_finite() || i % 10 > 0).map(|(_, t)| t);
     assert!(!ChiSquare::default().against_cdf(kept, cdf, 50).passes());
     let negative = draw(sigma_t).map(|t| if t > 1.999 && t.is_finite() { -t } else { t });
@@ -175,7 +175,7 @@ fn distances_that_end_in_the_medium_and_those_that_leave_it() {
 fn lobes_that_end_in_a_jump_or_a_kink_pass_in_any_direction() {
     let mut random = SplitMix::new(2);
     for _ in 0..20 {
-        // An axis anywhere but along x, and the cosine at which the cone of even directions ends.
+        // An axis anywhere but along x, and the cosine at which the cone of uniform directions ends.
         let [a, b, c] = random.uniforms();
         let (cos_theta, phi) = (1.8 * a - 0.9, TAU * b);
         let sin_theta = (1.0 - cos_theta * cos_theta).sqrt();
@@ -191,10 +191,11 @@ fn lobes_that_end_in_a_jump_or_a_kink_pass_in_any_direction() {
 
         let even =
             |w: [f32; 3]| if along(w) > f64::from(edge) { 0.5 / PI / (1.0 - f64::from(edge)) } else { 0.0 };
-        let cone = ChiSquare::of(40).directions(|[a, b]: [f32; 2]| about(1.0 - a * (1.0 - edge), b), even);
+        let cone = ChiSquare::among(40).directions(|[a, b]: [f32; 2]| about(1.0 - a * (1.0 - edge), b), even);
         assert!(cone.passes(), "cone of {edge} about {axis:?}: {cone}");
         let cosine = |w: [f32; 3]| along(w).max(0.0) / PI;
-        let hemisphere = ChiSquare::of(40).directions(|[a, b]: [f32; 2]| about((1.0 - a).sqrt(), b), cosine);
+        let hemisphere =
+            ChiSquare::among(40).directions(|[a, b]: [f32; 2]| about((1.0 - a).sqrt(), b), cosine);
         assert!(hemisphere.passes(), "hemisphere about {axis:?}: {hemisphere}");
     }
 }
@@ -216,7 +217,7 @@ fn choices() {
 }
 
 #[test]
-fn the_message_tells_where() {
+fn the_message_says_where() {
     let fit =
         ChiSquare::default().directions(henyey_greenstein(0.5, POLE), henyey_greenstein_pdf(0.55, POLE));
     let message = fit.to_string();

@@ -1,4 +1,4 @@
-//! Comparing pictures must pass noise and reject what is not.
+//! Comparing pictures must accept noise and reject real differences.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -19,7 +19,7 @@ fn truth(x: usize, y: usize, channel: usize) -> f64 {
     (0.1 + x as f64 / WIDTH as f64 + y as f64 / HEIGHT as f64) * [1.0, 0.5, 0.25][channel]
 }
 
-/// A picture of the ramp, as a renderer would estimate it: the mean of samples, with its measured variance.
+/// A picture of the ramp, as a renderer would estimate it: the mean of samples, with its estimated variance.
 fn noisy(seed: u64, samples: usize) -> Picture {
     let mut random = SplitMix::new(seed);
     let mut estimate = |i: usize| {
@@ -38,7 +38,7 @@ fn exact() -> Picture {
     Picture::new(WIDTH, HEIGHT, (0..WIDTH * HEIGHT).map(pixel).collect(), None)
 }
 
-/// Moves one channel of a pixel by so many of its standard errors.
+/// Shifts one channel of a pixel by `sigma` of its standard errors.
 fn shift(picture: &mut Picture, pixel: usize, channel: usize, sigma: f32) {
     let deviation = picture.variance.as_ref().expect("a noisy picture")[pixel][channel].sqrt();
     picture.mean[pixel][channel] += sigma * deviation;
@@ -57,9 +57,9 @@ fn noise_passes() {
     image.compare_blocks(&exact, 7).assert_in(&folder("noise-blocks"));
     let comparison = image.compare(&other);
     assert!((comparison.mean_ratio() - 1.0).abs() < 2e-3, "{comparison}");
-    // Variance of the mean of 400 evenly distributed samples, for both: 2 / 3 / 400 relative to the square.
+    // Variance of the mean of 400 uniformly distributed samples, for both: 2 / 3 / 400 relative to the square.
     assert!((comparison.relative_mse() / (2.0 / 3.0 / 400.0) - 1.0).abs() < 0.1, "{comparison}");
-    // 3600 numbers, so the shares of a normal distribution within four standard errors.
+    // With 3600 numbers, the fractions of a normal distribution within four standard errors.
     assert!((comparison.blocks_past(2.0) - 0.0455).abs() < 4.0 * 0.0035, "{comparison}");
     assert!((comparison.blocks_past(3.0) - 0.0027).abs() < 4.0 * 0.0009, "{comparison}");
 }
@@ -76,7 +76,7 @@ fn one_pixel_off_by_five_sigma_is_rejected_and_named() {
     let worst = comparison.worst();
     assert_eq!((worst.x, worst.y, worst.channel), (7, 3, 1));
     assert!((worst.z + 5.0).abs() < 0.01, "{comparison}");
-    // What a normal distribution has somewhere in so many pixels is no fault.
+    // A deviation that a normal distribution reaches somewhere in so many pixels is no error.
     shift(&mut image, 3 * WIDTH + 7, 1, 1.5);
     assert!(image.compare(&exact).passes());
 }
@@ -106,7 +106,7 @@ fn two_percent_too_bright_shows_in_the_mean() {
 }
 
 #[test]
-fn without_noise_only_rounding_is_granted() {
+fn without_noise_only_rounding_is_allowed() {
     let (image, mut other) = (exact(), exact());
     other.mean[5][0] *= 1.0 + f32::EPSILON;
     assert!(image.compare(&other).passes());
@@ -133,12 +133,12 @@ fn what_is_not_a_number_never_passes() {
 
 #[test]
 fn correct_pictures_are_rejected_one_time_in_a_hundred() {
-    // Of so many normal numbers the farthest one has this distribution, which the threshold is a quantile of.
+    // The threshold is a quantile of the distribution of the largest of this many normal numbers.
     let exact = Picture::new(8, 8, vec![[0.5; 3]; 64], None);
     let mut random = SplitMix::new(6);
     let mut rejected = 0_u64;
     for _ in 0..1000 {
-        // Exactly normal numbers, by Box and Muller.
+        // Exactly normal numbers, by the Box-Muller transform.
         let mut normal = || {
             let (radius, angle) = ((-2.0 * (1.0 - random.uniform()).ln()).sqrt(), random.uniform());
             single(0.5 + 0.01 * radius * (std::f64::consts::TAU * angle).cos())
@@ -173,7 +173,7 @@ fn a_failure_leaves_pictures_and_says_where() {
     assert!(shown[2 * WIDTH + 3][0] > expected[2 * WIDTH + 3][0] + 50, "the bright pixel is bright");
     assert_eq!((error[2 * WIDTH + 3], error[20 * WIDTH + 30]), ([255, 0, 0], [0, 0, 255]));
     let strong = error.iter().filter(|rgb| rgb.contains(&0)).count();
-    assert_eq!(strong, 2, "only the faults are saturated");
+    assert_eq!(strong, 2, "only the two errors are saturated");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The functions that rendering spends its time in, by themselves: `cargo bench -p tyndall`.
+//! Benchmarks of the functions that rendering spends its time in: `cargo bench -p tyndall`.
 
 use divan::{Bencher, black_box};
 use std::sync::Arc;
@@ -31,10 +31,10 @@ fn medium(kind: Kind) -> Medium {
     Medium::new(Arc::new(volume), Arc::new(transfer), &settings)
 }
 
-/// Kinds of stored samples: floats, and eighths in bytes.
+/// Volumes with different voxel types: floats, and bytes in eighths.
 const KINDS: [Kind; 2] = [Kind::Cloud, Kind::Shells];
 
-/// Places and tracks all over the box.
+/// Positions all over the box.
 fn positions() -> impl Iterator<Item = Vec3> {
     let mut stream = Stream::new(1, [2, 3, 4]);
     std::iter::repeat_with(move || Vec3::new(stream.uniform(), stream.uniform(), stream.uniform()) * 127.0)

@@ -1,8 +1,8 @@
-//! Tyndall renders volumes under real global illumination and stays interactive while they are edited.
+//! Tyndall renders volumes with full global illumination and stays interactive while they are edited.
 //!
-//! This crate is the renderer: it knows no file, document, window, server, Python or GPU. Modules follow the
-//! concepts of the field, and imports run one way, from [`math`] up to the [`session`]. Programs that open files and edit
-//! scenes start from `tyndall_live::LiveSession`, whose crate shows both in ten lines.
+//! This crate is the renderer: it knows nothing of files, documents, windows, servers, Python or GPUs. Modules follow
+//! the concepts of the field, and dependencies run one way: from [`math`] at the bottom to [`session`] at the top.
+//! Programs that open files and edit scenes start from `tyndall_live::LiveSession`; its crate page has short examples.
 
 pub mod camera;
 pub mod film;

@@ -1,14 +1,14 @@
-//! What users' words look like in messages: short, and without what would move a terminal's cursor.
+//! How user-supplied text is quoted in messages: shortened, and without characters that would move a terminal's cursor.
 
 use std::path::Path;
 
-/// A key or a word: its first 60 characters, control characters escaped.
+/// A key or a word: its first 60 characters, with control characters escaped.
 #[must_use]
 pub fn excerpt(text: &str) -> String {
     shown(text, 60, 0)
 }
 
-/// The same between double quotes, in which quotes are escaped too.
+/// The same between double quotes, with quotes escaped too.
 #[must_use]
 pub fn quoted(text: &str) -> String {
     const LONGEST: usize = 60;
@@ -17,19 +17,19 @@ pub fn quoted(text: &str) -> String {
     format!("{:?}", short + more)
 }
 
-/// What another library says, which may quote a file at length: its first 300 characters.
+/// Another library's message, which may quote a file at length: its first 300 characters.
 #[must_use]
 pub fn sentence(text: &str) -> String {
     shown(&text.split_whitespace().collect::<Vec<_>>().join(" "), 300, 0)
 }
 
-/// A path: whole where it has up to 240 characters, else its beginning and its end, which tell it best.
+/// A path: whole up to 240 characters, otherwise its beginning and end, which identify it best.
 #[must_use]
 pub fn path_name(path: &Path) -> String {
     shown(&path.to_string_lossy(), 80, 160)
 }
 
-/// The first and last so many characters, with dots between where others are left out.
+/// The given numbers of first and last characters, with dots between them if any are left out.
 fn shown(text: &str, head: usize, tail: usize) -> String {
     let characters = text.chars().count();
     if characters <= head + tail {
@@ -40,7 +40,7 @@ fn shown(text: &str, head: usize, tail: usize) -> String {
     first.chain(["...".to_owned()]).chain(last).collect()
 }
 
-/// A character as it is, or the escape of one that acts instead of showing: controls, and those that turn text round.
+/// A character, escaped if it is a control character or one that changes the direction of text.
 fn visible(character: char) -> String {
     let acts = character.is_control()
         || matches!(character, '\u{200e}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');

@@ -1,8 +1,8 @@
-//! What the sources cite, `references.bib` lists, and what it lists is cited.
+//! Every citation is listed in `references.bib`, and every entry there is cited.
 //!
 //! A citation is a key in square brackets: the first author's name and two digits of the year, and, after a
 //! comma, the place in the work or another key. In doc comments the brackets are escaped, or rustdoc would
-//! take the key for an item's name.
+//! read the key as a link to an item.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -33,15 +33,15 @@ fn read(path: &Path) -> String {
     fs::read_to_string(path).expect("a text of the repository")
 }
 
-/// Two letters at least, two digits, and a letter where one author and year have more than one work.
-/// One letter and two digits is a number type of Rust.
+/// At least two letters, two digits, and a letter if the author has more than one work of that year.
+/// One letter and two digits would be a Rust number type, such as `f64`.
 fn is_key(text: &str) -> bool {
     let text = text.strip_suffix(|c: char| c.is_ascii_lowercase()).unwrap_or(text);
     let name = text.trim_end_matches(|c: char| c.is_ascii_digit());
     text.len() == name.len() + 2 && name.len() >= 2 && name.chars().all(|c| c.is_ascii_alphabetic())
 }
 
-/// The keys between square brackets, escaped or not; before a parenthesis they are the text of a link.
+/// The keys between square brackets, escaped or not, unless a parenthesis follows: then they are the text of a link.
 fn keys(text: &str) -> Vec<&str> {
     let mut found = Vec::new();
     for (opening, _) in text.match_indices('[') {
@@ -54,7 +54,7 @@ fn keys(text: &str) -> Vec<&str> {
     found
 }
 
-/// What follows the first `//` that begins the line or comes after white space, as none of an address does.
+/// The text after the first `//` that begins the line or follows white space, which the `//` of a URL does not.
 fn comment(line: &str) -> Option<&str> {
     let begins = |start: usize| line[..start].chars().next_back().is_none_or(char::is_whitespace);
     let (start, _) = line.match_indices("//").find(|(start, _)| begins(*start))?;
@@ -66,7 +66,7 @@ fn comments(source: &str) -> String {
     source.lines().map(|line| comment(line).unwrap_or_default()).collect::<Vec<_>>().join("\n")
 }
 
-/// Each key that is cited, with the files that cite it.
+/// Each cited key, with the files that cite it.
 fn cited() -> BTreeMap<String, BTreeSet<PathBuf>> {
     let root = repository();
     let mut documents = files(&root.join("docs"), "md");
@@ -81,7 +81,7 @@ fn cited() -> BTreeMap<String, BTreeSet<PathBuf>> {
             found.entry(key.to_owned()).or_default().insert(path.to_owned());
         }
     }
-    assert!(found.len() > 20, "only {} keys were seen: the test reads nothing", found.len());
+    assert!(found.len() > 20, "only {} keys were found: the test checks nothing", found.len());
     found
 }
 
@@ -96,11 +96,11 @@ fn listed() -> Vec<String> {
 fn each_citation_has_its_entry() {
     let listed = listed();
     let missing: Vec<_> = cited().into_iter().filter(|(key, _)| !listed.contains(key)).collect();
-    assert!(missing.is_empty(), "references.bib lacks what these files cite: {missing:#?}");
+    assert!(missing.is_empty(), "references.bib lacks keys that these files cite: {missing:#?}");
 }
 
 #[test]
-fn each_entry_is_cited_and_stands_once() {
+fn each_entry_is_cited_and_listed_once() {
     let cited = cited();
     let listed = listed();
     let idle: Vec<_> = listed.iter().filter(|key| !cited.contains_key(*key)).collect();
@@ -110,7 +110,7 @@ fn each_entry_is_cited_and_stands_once() {
 }
 
 #[test]
-fn keys_are_told_from_links_and_code() {
+fn keys_are_distinguished_from_links_and_code() {
     let cases: [(&str, &[&str]); 14] = [
         ("a lobe [HG41]: wide", &["HG41"]),
         (r"a lobe \[HG41\].", &["HG41"]),
@@ -134,7 +134,7 @@ fn keys_are_told_from_links_and_code() {
 
 #[test]
 fn only_comments_of_sources_are_read() {
-    // Tabs, not spaces: this file is read too.
+    // Tabs, not spaces, before `//`: this file is checked too, and a space would make these its own comments.
     let source = "//! [Aa01]\n\t/// \\[Bb02,\n\t/// fig. 1\\]\ny[cc03];\t// [Dd04]\n\"https://[Ee05]\"";
     assert_eq!(keys(&comments(source)), ["Aa01", "Bb02", "Dd04"]);
 }

@@ -1,10 +1,10 @@
-//! The crate's rooms import one way only; this reads their `use` lines and holds them to it.
+//! The crate's top-level modules, its "rooms", import in one direction only; this checks their `use` lines.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use tyndall::integrator::{METHODS, MethodEntry};
 
-/// From the ground up: a room may use its own floor and those before it.
+/// From the bottom up: a room may import rooms of lower floors; `transfer` and `scattering` also each other.
 const FLOORS: [&[&str]; 10] = [
     &["math", "message"],
     &["simd"],
@@ -45,33 +45,32 @@ fn imports_run_one_way() {
         if room == "lib" {
             continue;
         }
-        let own =
-            floor(&room).unwrap_or_else(|| panic!("room `{room}` stands on no floor; give it one here"));
+        let own = floor(&room).unwrap_or_else(|| panic!("room `{room}` is on no floor; add it to FLOORS"));
         for used in fs::read_to_string(&path).unwrap().split("crate::").skip(1) {
             let used: String = used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-            // Macros and items of the crate's root are no rooms.
+            // Macros and items of the crate's root are not rooms.
             let Some(used_floor) = floor(&used) else { continue };
             let allowed = used_floor < own || used == room || (used_floor == own && own == 4);
-            assert!(allowed, "{}: `{room}` must not know `{used}`", path.display());
+            assert!(allowed, "{}: `{room}` must not import `{used}`", path.display());
             imports += 1;
         }
     }
-    assert!(imports > 50, "only {imports} imports were seen: the test reads nothing");
+    assert!(imports > 50, "only {imports} imports were found: the test checks nothing");
 }
 
-/// The folders of methods, by the list of methods.
+/// The folder names of the methods, from the list of methods.
 fn methods() -> Vec<String> {
     METHODS.iter().map(MethodEntry::table).collect()
 }
 
-/// What stands in a file before its unit tests, without comments and citations.
+/// The code of a file before its unit tests, without comments.
 fn code(path: &Path) -> String {
     let text = fs::read_to_string(path).expect("a source file");
     let code = text.split("#[cfg(test)]").next().unwrap_or_default();
     code.lines().filter(|line| !line.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
 }
 
-/// Whether code names a method: as a module, as a word in quotes, or as a table of the document.
+/// Whether code names a method: as a module, as a quoted word, or as a table of the scene document.
 fn names(code: &str, method: &str) -> bool {
     let hyphens = method.replace('_', "-");
     let mut spelt = vec![
@@ -80,7 +79,7 @@ fn names(code: &str, method: &str) -> bool {
         format!("render.{method}"),
         format!("`{hyphens}`"),
     ];
-    // "path" is the key of a file, too.
+    // "path" is also the key of a file in the document.
     if method != "path" {
         spelt.extend([format!("\"{hyphens}\""), format!("\"{method}\"")]);
     }
@@ -95,7 +94,7 @@ fn a_method_is_named_in_its_folder_and_in_one_list() {
     for room in ["tyndall", "formats", "live", "cli"] {
         let root = crates.join(room).join("src").canonicalize().unwrap();
         for path in sources(&root) {
-            // Benches measure certain methods; tests of a file may.
+            // Benchmarks name the methods that they measure, and unit tests may name methods.
             if path == list || path.components().any(|c| c.as_os_str() == "bench" || c.as_os_str() == "tests")
             {
                 continue;
@@ -140,7 +139,7 @@ fn the_renderer_knows_no_file_and_no_window() {
     }
 }
 
-/// Who writes counters by hand may draw what others draw.
+/// Code that makes its own counters might reuse random numbers that other code draws.
 #[test]
 fn addresses_of_random_numbers_come_from_one_table() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");

@@ -155,17 +155,17 @@ pub fn threads(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     Ok(rows)
 }
 
-/// How late a session answers, in milliseconds.
+/// How late a session reacts, in milliseconds.
 #[derive(Default)]
 struct Lateness {
-    /// The time that each slice of work took beyond its deadline.
+    /// By how much each slice of work overran its deadline.
     stops: Vec<f64>,
-    /// The time that each edited scene took to be accepted.
+    /// Time to accept each edited scene.
     edits: Vec<f64>,
 }
 
 impl Lateness {
-    /// Refines in slices of 3 to 20 ms, so that stops come in all stages of the work.
+    /// Refines in slices of 3 to 20 ms, so that deadlines fall in all stages of the work.
     fn refine(&mut self, session: &mut Session, samples: u32, slices: u64) {
         for slice in 0..slices {
             if session.film().samples() >= samples {
@@ -184,8 +184,8 @@ impl Lateness {
     }
 }
 
-/// How late each method stops and accepts edits, through all stages of its work; and how long majorants take after an edit of the
-/// transfer function.
+/// How late each method stops, through all stages of its work, and how long it takes to accept an edit; and how long majorants
+/// take after an edit of the transfer function.
 pub fn latency(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str = "latency, 256^3 voxels, 512 x 512 pixels, 8 scatterings, two threads";
     const MOST_MS: f64 = 5.0;

@@ -1,4 +1,4 @@
-//! How soon an edit shows: from the patch to coarse pictures in the caller's hands, and the time of a look.
+//! How soon an edit shows: the time from the patch to coarse pictures in the caller's buffer, and the time of a look.
 
 use super::Row;
 use super::scenes::ct;
@@ -13,12 +13,12 @@ use tyndall::integrator::METHODS;
 use tyndall::simd::Level;
 use tyndall_live::{Budget, Input, LiveSession, Options};
 
-/// Targets in milliseconds, of the default method on a scan.
+/// Targets in milliseconds, for the default method on a scan.
 const EIGHTS_MS: f64 = 50.0;
 const FOURS_MS: f64 = 130.0;
 const LOOK_MS: f64 = 4.0;
 
-/// Edits of camera and transfer function by turns, of files or of a generated volume, by every method.
+/// Alternating edits of camera and transfer function, on files or a generated volume, with every method.
 pub fn edits(effort: &Effort, level: Level, files: &[PathBuf]) -> Result<Vec<Row>, Failure> {
     const TABLE: &str = "from the patch to the picture, 800 x 800 pixels, medians of 20 edits, two threads";
     let mut inputs = Vec::new();
@@ -35,7 +35,8 @@ pub fn edits(effort: &Effort, level: Level, files: &[PathBuf]) -> Result<Vec<Row
         for method in METHODS {
             let side = effort.pick(800, 32);
             let mut input = input.clone();
-            input.patch(&json!({ "film": { "size": [side, side] }, "render": { "integrator": method.name } }));
+            let patch = json!({ "film": { "size": [side, side] }, "render": { "integrator": method.name } });
+            input.patch(&patch).map_err(Failure::input)?;
             let on = Options { threads: pool(Some(2))?, level, edits: true };
             let mut live = LiveSession::start(input, on).map_err(Failure::input)?;
             let times = Times::of(&mut live, effort.pick(20, 2))?;
@@ -50,7 +51,7 @@ pub fn edits(effort: &Effort, level: Level, files: &[PathBuf]) -> Result<Vec<Row
     Ok(rows)
 }
 
-/// Milliseconds from the patch to a picture, edit by edit.
+/// Milliseconds from the patch to a picture, for each edit.
 #[derive(Default)]
 struct Times {
     eights: Vec<f64>,
@@ -85,7 +86,7 @@ impl Times {
     }
 }
 
-/// The scene's transfer function with slightly less opacity.
+/// The scene's transfer function with 2 % less opacity.
 fn points(live: &LiveSession) -> Vec<Value> {
     let of = |p: &tyndall::transfer::Point| {
         let optics = &p.optics;
@@ -98,7 +99,7 @@ fn points(live: &LiveSession) -> Vec<Value> {
     live.scene().medium.transfer().points().iter().map(of).collect()
 }
 
-/// A look at a film of a megapixel, all of which changed.
+/// A look at a film of one megapixel, all of which changed.
 pub fn look(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const TABLE: &str = "a look at 1000 x 1000 pixels that all changed, two threads";
     let side = effort.pick(1000, 64);
@@ -112,7 +113,9 @@ pub fn look(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     for samples in effort.pick(&[1, 20, 100][..], &[1]) {
         live.refine(&Budget::samples(*samples));
         let seconds = effort.seconds(&mut || live.look(&mut Viewer::default()));
-        rows.push(Row::new(TABLE, format!("{samples} samples"), "time", "ms", seconds * 1e3).at_most(LOOK_MS));
+        rows.push(
+            Row::new(TABLE, format!("{samples} samples"), "time", "ms", seconds * 1e3).at_most(LOOK_MS),
+        );
     }
     Ok(rows)
 }

@@ -97,13 +97,12 @@ impl Row {
         })
     }
 
-    /// A row of a Markdown table.
-    fn markdown(&self) -> String {
-        let Self { row, quantity, unit, ours, paper, .. } = self;
-        let paper = paper.map_or(String::new(), |paper| paper.to_string());
-        let met = self.target.is_none_or(|target| target.is_met_by(*ours));
-        let ours = if met { format!("{ours:.3}") } else { format!("**{ours:.3}**") };
-        format!("| {row} | {quantity} | {ours} | {unit} | {} | {paper} |\n", self.target())
+    /// A cell of a Markdown table: the figure, bold if it misses its target, and the paper's beside it.
+    fn cell(&self) -> String {
+        let met = self.target.is_none_or(|target| target.is_met_by(self.ours));
+        let ours = short(self.ours);
+        let ours = if met { ours } else { format!("**{ours}**") };
+        self.paper.map_or(ours.clone(), |paper| format!("{ours} / {paper}"))
     }
 
     fn line(&self) -> String {
@@ -114,10 +113,52 @@ impl Row {
     }
 }
 
-/// A table for the documentation; a figure that misses its target is bold.
+/// A figure with three digits that count.
+fn short(x: f64) -> String {
+    let decimals = match x.abs() {
+        0.0 | 100.0.. => 0,
+        10.0.. => 1,
+        1.0.. => 2,
+        0.01.. => 3,
+        _ => 5,
+    };
+    format!("{x:.decimals$}")
+}
+
+/// A table for the documentation: a line for each case and a column for each quantity, in the order in which they were measured.
 fn markdown(title: &str, rows: &[Row]) -> String {
-    let head = "| row | quantity | ours | unit | target | paper |\n| --- | --- | --- | --- | --- | --- |\n";
-    format!("\n### {title}\n\n{head}{}", rows.iter().map(Row::markdown).collect::<String>())
+    let mut columns: Vec<(&'static str, &'static str)> = Vec::new();
+    let mut cases: Vec<&str> = Vec::new();
+    for row in rows {
+        if !columns.contains(&(row.quantity, row.unit)) {
+            columns.push((row.quantity, row.unit));
+        }
+        if !cases.contains(&row.row.as_str()) {
+            cases.push(&row.row);
+        }
+    }
+    let mut text = format!("\n### {title}\n\n| |");
+    let of = |column: (&'static str, &'static str)| {
+        rows.iter().filter(move |row| (row.quantity, row.unit) == column)
+    };
+    for &(quantity, unit) in &columns {
+        let mut targets: Vec<String> =
+            of((quantity, unit)).map(Row::target).filter(|t| !t.is_empty()).collect();
+        targets.dedup();
+        let targets = if targets.is_empty() { String::new() } else { format!(" ({})", targets.join("; ")) };
+        let unit = if unit == "ratio" { String::new() } else { format!(", {unit}") };
+        text += &format!(" {quantity}{unit}{targets} |");
+    }
+    text += &format!("\n| --- |{}\n", " --- |".repeat(columns.len()));
+    for case in cases {
+        text += &format!("| {case} |");
+        for &column in &columns {
+            let cell = of(column).find(|row| row.row == case).map_or(String::new(), Row::cell);
+            text += &format!(" {cell} |");
+        }
+        text += "\n";
+    }
+    text
 }
 
 /// Measures the rows of one table with the given vector instructions.
@@ -174,4 +215,22 @@ pub fn run(options: &BenchOptions) -> Result<(), Failure> {
         say(&format!("{:#}\n", Value::Array(rows)))?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_markdown_table_has_a_line_for_each_case_and_a_column_for_each_quantity() {
+        let rows = [
+            Row::new("t", "a", "time", "s", 0.123_456),
+            Row::new("t", "a", "speed-up", "ratio", 9.0).at_least(10.0).beside(Some(15.2)),
+            Row::new("t", "b", "time", "s", 1234.5),
+            Row::new("t", "c", "speed-up", "ratio", 20.04).at_least(10.0),
+        ];
+        let expected = "\n### t\n\n| | time, s | speed-up (>= 10) |\n| --- | --- | --- |\n\
+            | a | 0.123 | **9.00** / 15.2 |\n| b | 1234 |  |\n| c |  | 20.0 |\n";
+        assert_eq!(markdown("t", &rows), expected);
+    }
 }

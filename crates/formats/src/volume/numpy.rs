@@ -121,7 +121,7 @@ impl Stored {
 fn sample_type(path: &Path, descr: &str) -> Result<(Stored, Endian), ReadError> {
     let expected = "|u1, |i1, <u2, <i2, <u4, <i4, <f2, <f4, <f8 or |b1, or > for big-endian";
     let wrong = || ReadError::header(path, "descr", descr, expected);
-    let mend = "save it with `.astype(numpy.float32)` or another type of at most 4 bytes, or float64";
+    let fix = "save it with `.astype(numpy.float32)` or another type of at most 4 bytes, or float64";
     if descr.starts_with('[') {
         return Err(ReadError::unsupported(path, "an array of records", "save one of its fields"));
     }
@@ -142,7 +142,7 @@ fn sample_type(path: &Path, descr: &str) -> Result<(Stored, Endian), ReadError> 
         "f8" => SampleType::F64,
         "f2" => return Ok((Stored::Half, endian)),
         "i8" | "u8" | "f16" | "c8" | "c16" | "O" => {
-            return Err(ReadError::unsupported(path, format!("an array of `{name}`"), mend));
+            return Err(ReadError::unsupported(path, format!("an array of `{name}`"), fix));
         }
         _ => return Err(wrong()),
     };

@@ -94,8 +94,8 @@ pub(super) fn samples(
         }
         let mut reader = decode(file, coding).map_err(trouble)?;
         let Start::After(bytes) = start else {
-            let mend = "state the number of bytes to skip, or store the samples uncompressed";
-            return Err(ReadError::unsupported(path, "skipping to the end of compressed data", mend));
+            let fix = "state the number of bytes to skip, or store the samples uncompressed";
+            return Err(ReadError::unsupported(path, "skipping to the end of compressed data", fix));
         };
         let skipped = io::copy(&mut reader.by_ref().take(bytes), &mut io::sink())
             .map_err(|e| ReadError::Damaged { path: path.into(), message: e.to_string() })?;

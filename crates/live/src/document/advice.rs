@@ -1,4 +1,4 @@
-//! How to mend an unknown word: the nearest known one, or that it comes with a later version.
+//! Advice on an unknown word: the nearest known one, or that it comes with a later version.
 
 use super::node::Node;
 use super::schema::TAG;
@@ -11,7 +11,7 @@ const LATER_KEYS: [&str; 5] =
 /// Integrators that this version does not have yet.
 const LATER_INTEGRATORS: [&str; 3] = ["many-light", "irradiance-cache", "refractive"];
 
-/// The mend for a key that `node` does not have.
+/// How to fix a key that `node` does not have.
 pub(super) fn unknown_key(path: &str, key: &str, node: Node, union: Node) -> String {
     if LATER_KEYS.contains(&path) {
         return format!("this version of Tyndall does not have `{path}` yet: leave it out");
@@ -26,7 +26,7 @@ pub(super) fn unknown_key(path: &str, key: &str, node: Node, union: Node) -> Str
     format!("known here: {}", listed(node.keys().filter(|key| *key != TAG || node.tag().is_some())))
 }
 
-/// The mend for a word that is none of `known`.
+/// How to fix a word that is not one of `known`.
 pub(super) fn unknown_word(word: &str, known: &[&'static str]) -> Option<String> {
     if known.contains(&DEFAULT_METHOD.name) && LATER_INTEGRATORS.contains(&word) {
         return Some(format!("this version of Tyndall does not have the integrator `{word}` yet"));
@@ -34,14 +34,14 @@ pub(super) fn unknown_word(word: &str, known: &[&'static str]) -> Option<String>
     nearest(word, known.iter().copied()).map(|near| format!("did you mean \"{near}\"?"))
 }
 
-/// Words between commas.
+/// The words in backquotes, separated by commas.
 fn listed<'a>(words: impl Iterator<Item = &'a str>) -> String {
     words.map(|word| format!("`{word}`")).collect::<Vec<_>>().join(", ")
 }
 
 /// The known word that a mistyped one most likely meant.
 fn nearest<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    /// Longer words were not mistyped, and comparing takes the product of the lengths.
+    /// Longer words are not typing errors, and the time to compare grows with the product of the lengths.
     const LONGEST: usize = 64;
     if word.len() > LONGEST {
         return None;
@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_slip_finds_its_word_and_a_strange_word_none() {
+    fn a_mistyped_word_finds_the_nearest_known_one_and_an_unrelated_word_none() {
         let known = || ["density", "phase", "brdf", "gradient_factor"].into_iter();
         assert_eq!(nearest("densty", known()), Some("density"));
         assert_eq!(nearest("Density", known()), Some("density"));
@@ -68,12 +68,12 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_later_is_said_to_come() {
+    fn what_comes_with_later_versions_is_reported_as_such() {
         let root = Node::root();
-        let mend = unknown_key("objects", "objects", root, root);
-        assert!(mend.contains("does not have `objects` yet"), "{mend}");
-        let mend = unknown_word("many-light", &["raymarch", "path"]).unwrap();
-        assert!(mend.contains("does not have the integrator `many-light` yet"), "{mend}");
+        let fix = unknown_key("objects", "objects", root, root);
+        assert!(fix.contains("does not have `objects` yet"), "{fix}");
+        let fix = unknown_word("many-light", &["raymarch", "path"]).unwrap();
+        assert!(fix.contains("does not have the integrator `many-light` yet"), "{fix}");
     }
 
     #[test]

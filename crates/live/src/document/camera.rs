@@ -5,26 +5,26 @@ use serde::{Deserialize, Serialize};
 
 use super::shape::{Elevation, FieldOfView, NonNegative, Position, Positive, Vector};
 
-/// From where the picture is taken. Give a `position`, or `auto`, or neither for an automatic view.
+/// The viewpoint of the picture. Give a `position`, or `auto`, or neither for an automatic view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 #[schemars(extend("default" = { "type": "perspective" }))]
 pub enum Camera {
-    /// Near things look larger, as an eye sees them.
+    /// Near things look larger, as to the eye.
     #[schemars(extend(
         "not" = { "required": ["auto", "position"] },
         "dependentRequired" = { "target": ["position"] }
     ))]
     Perspective {
-        /// Place of the eye, in world units.
+        /// Position of the eye, in world units.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Position>")]
         position: Option<[f64; 3]>,
-        /// Point that is looked at; when omitted, the centre of the volume. Stands beside `position`.
+        /// Point to look at; when omitted, the centre of the volume. Only with `position`.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Position>")]
         target: Option<[f64; 3]>,
-        /// Direction that is up in the picture; when omitted, [0, 0, 1] for an anatomical volume and else [0, 1, 0].
+        /// Direction that is up in the picture; when omitted, [0, 0, 1] for an anatomical volume, otherwise [0, 1, 0].
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Vector>")]
         up: Option<[f32; 3]>,
@@ -40,7 +40,7 @@ pub enum Camera {
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Positive>")]
         focus: Option<f32>,
-        /// Automatic view that fits the volume; stands instead of `position`.
+        /// Automatic view that fits the volume; excludes `position`.
         #[serde(skip_serializing_if = "Option::is_none")]
         auto: Option<AutoView>,
     },
@@ -54,33 +54,33 @@ pub enum Camera {
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Position>")]
         position: Option<[f64; 3]>,
-        /// Point that is looked at; when omitted, the centre of the volume. Stands beside `position`.
+        /// Point to look at; when omitted, the centre of the volume. Only with `position`.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Position>")]
         target: Option<[f64; 3]>,
-        /// Direction that is up in the picture; when omitted, [0, 0, 1] for an anatomical volume and else [0, 1, 0].
+        /// Direction that is up in the picture; when omitted, [0, 0, 1] for an anatomical volume, otherwise [0, 1, 0].
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Vector>")]
         up: Option<[f32; 3]>,
-        /// Height of the picture, in world units; when omitted, so that the volume fits.
+        /// Height of the picture, in world units; when omitted, chosen so that the volume fits.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Positive>")]
         height: Option<f32>,
-        /// Automatic view that fits the volume; stands instead of `position`.
+        /// Automatic view that fits the volume; excludes `position`.
         #[serde(skip_serializing_if = "Option::is_none")]
         auto: Option<AutoView>,
     },
 }
 
 impl Camera {
-    /// Place of the eye; `None` means an automatic view.
+    /// Position of the eye; `None` means an automatic view.
     #[must_use]
     pub fn position(&self) -> Option<[f64; 3]> {
         let (Self::Perspective { position, .. } | Self::Orthographic { position, .. }) = self;
         *position
     }
 
-    /// Point that is looked at; `None` means the centre of the volume.
+    /// Point to look at; `None` means the centre of the volume.
     #[must_use]
     pub fn target(&self) -> Option<[f64; 3]> {
         let (Self::Perspective { target, .. } | Self::Orthographic { target, .. }) = self;
@@ -94,7 +94,7 @@ impl Camera {
         *up
     }
 
-    /// The automatic view; its defaults unless the document sets it. Counts only without a [`Self::position`].
+    /// The automatic view, or its defaults if the document does not set it. Used only without a [`Self::position`].
     #[must_use]
     pub fn auto(&self) -> AutoView {
         let (Self::Perspective { auto, .. } | Self::Orthographic { auto, .. }) = self;
@@ -125,11 +125,11 @@ fn default_fov() -> f32 {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AutoView {
-    /// Turn of the eye about the up axis, in degrees; 0 sees the volume's front. When omitted, fit to the volume's kind.
+    /// Rotation of the eye about the up axis, in degrees; 0 sees the front. When omitted, it suits the kind of volume.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub azimuth: Option<f32>,
 
-    /// Height of the eye above the horizon, in degrees. When omitted, fit to the volume's kind.
+    /// Angle of the eye above the horizon, in degrees. When omitted, chosen for the kind of volume.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Elevation>")]
     pub elevation: Option<f32>,

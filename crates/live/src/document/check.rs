@@ -1,7 +1,7 @@
-//! Checks a document against its JSON Schema, and brings it to the form that the types read.
+//! Checks a document against its JSON Schema, and converts it to the form from which the types are deserialized.
 //!
-//! Of JSON Schema this knows what the document's own schema uses. It goes down the schema, not down the document, so
-//! that no nesting of the input can exhaust the stack.
+//! Only the part of JSON Schema that the document's own schema uses is supported. The recursion follows the schema, not
+//! the document, so that no nesting of the input can exhaust the stack.
 
 use serde_json::{Map, Number, Value};
 
@@ -13,11 +13,11 @@ use super::schema::TAG;
 use tyndall::math::cast;
 use tyndall::message::quoted;
 
-/// Checks `document`; a grey becomes a colour, 3.0 becomes 3 where a whole number belongs, and a type left to its
-/// default is named.
+/// Checks `document` and converts it: a grey becomes a colour, 3.0 becomes 3 where a whole number is expected, and an
+/// omitted type is filled in with its default.
 ///
 /// # Errors
-/// [`DocumentError::Content`] with every problem, unless they are many.
+/// [`DocumentError::Content`] with every problem, up to a limit.
 pub(super) fn check(document: &mut Value) -> Result<(), DocumentError> {
     let mut check = Check::default();
     check.value(document, Node::root(), "");
@@ -54,7 +54,7 @@ impl Check {
             (value, None) => {
                 let problem = Problem::new(path, describe_value(value), describe(node));
                 self.problems.push(match value {
-                    Value::Null => problem.with_mend("leave the key out to have its default"),
+                    Value::Null => problem.with_fix("leave the key out to use its default"),
                     _ => problem,
                 });
             }
@@ -86,7 +86,7 @@ impl Check {
         let place =
             path.rsplit_once('.').map_or("the document".to_owned(), |(table, _)| format!("`{table}`"));
         let problem = Problem::new(path, "an unknown key", format!("a key of {place}"));
-        self.problems.push(problem.with_mend(unknown_key(path, key, node, union)));
+        self.problems.push(problem.with_fix(unknown_key(path, key, node, union)));
     }
 
     fn unknown_type(&mut self, table: &Map<String, Value>, union: Node, path: &str) {
@@ -94,8 +94,8 @@ impl Check {
         let expected = tags.iter().map(|tag| format!("{tag:?}")).collect::<Vec<_>>().join(" or ");
         let found = table.get(TAG).map_or("nothing".to_owned(), describe_value);
         let problem = Problem::new(join(path, TAG), found, expected);
-        let mend = table.get(TAG).and_then(Value::as_str).and_then(|tag| unknown_word(tag, &tags));
-        self.problems.push(Problem { mend, ..problem });
+        let fix = table.get(TAG).and_then(Value::as_str).and_then(|tag| unknown_word(tag, &tags));
+        self.problems.push(Problem { fix, ..problem });
     }
 
     fn alternatives(&mut self, table: &Map<String, Value>, node: Node, path: &str) {
@@ -104,7 +104,7 @@ impl Check {
             match (table.contains_key(a), table.contains_key(b)) {
                 (true, true) => {
                     let problem = Problem::new(path, format!("both `{a}` and `{b}`"), "one of them");
-                    self.problems.push(problem.with_mend("leave one of them out"));
+                    self.problems.push(problem.with_fix("leave one of them out"));
                 }
                 (false, false) if alternatives.needed => {
                     self.report(path, format!("neither `{a}` nor `{b}`"), "one of them");
@@ -120,7 +120,7 @@ impl Check {
                     "both or neither",
                 );
                 self.problems
-                    .push(problem.with_mend(format!("give `{leader}` too, or leave `{companion}` out")));
+                    .push(problem.with_fix(format!("give `{leader}` too, or leave `{companion}` out")));
             }
         }
     }
@@ -129,7 +129,7 @@ impl Check {
         let (shortest, longest) = length(node);
         let count = items.len() as u64;
         if count < shortest || longest.is_some_and(|longest| count > longest) {
-            return self.report(path, format!("a list of {count}"), describe(node));
+            return self.report(path, format!("a list of length {count}"), describe(node));
         }
         let Some(node) = node.items() else { return };
         for (i, item) in items.iter_mut().enumerate() {
@@ -143,17 +143,17 @@ impl Check {
         if words.is_empty() {
             let shortest = node.keyword("minLength").and_then(Value::as_u64).unwrap_or(0);
             if (text.len() as u64) < shortest {
-                self.report(path, "an empty text", describe(node));
+                self.report(path, "empty text", describe(node));
             }
         } else if !words.contains(&text) {
             let problem = Problem::new(path, quoted(text), describe(node));
-            self.problems.push(Problem { mend: unknown_word(text, &words), ..problem });
+            self.problems.push(Problem { fix: unknown_word(text, &words), ..problem });
         }
     }
 
     fn number(&mut self, number: &mut Number, node: Node, path: &str) {
         let format = node.keyword("format").and_then(Value::as_str);
-        // The range holds for the number that the renderer will have, in its precision.
+        // The range applies to the number that the renderer will use, rounded to its precision.
         let round = |x: f64| if format == Some("float") { f64::from(cast::single(x)) } else { x };
         let bound = |name: &str| node.keyword(name).and_then(Value::as_f64).map(round);
         let x = round(number.as_f64().unwrap_or(f64::NAN));
@@ -161,7 +161,7 @@ impl Check {
             && bound("maximum").is_none_or(|high| x <= high)
             && bound("exclusiveMinimum").is_none_or(|low| x > low)
             && bound("exclusiveMaximum").is_none_or(|high| x < high);
-        // The zero that a range from 0 lets in has no sign: the renderer divides by densities.
+        // A range from 0 also lets in -0, which becomes 0 here: the renderer divides by densities.
         if x == 0.0 && x.is_sign_negative() {
             *number = Number::from_f64(0.0).unwrap_or_else(|| number.clone());
         }
@@ -177,7 +177,7 @@ impl Check {
         if !in_range {
             self.report(path, number.to_string(), describe(node));
         } else if !fits {
-            self.report(path, number.to_string(), format!("{}, not as large", describe(node)));
+            self.report(path, number.to_string(), format!("{}, of smaller magnitude", describe(node)));
         }
     }
 }
@@ -197,7 +197,7 @@ impl Node {
     }
 }
 
-/// A number without a fraction as an integer: 64.0 means 64. Very large ones stay as they are.
+/// A number without a fraction, as an integer: 64.0 means 64. Very large ones stay as they are.
 fn whole(number: &Number) -> Option<Number> {
     if !number.is_f64() {
         return Some(number.clone());

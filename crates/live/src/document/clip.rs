@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::shape::{Position, Vector};
 
-/// A cut through the volume; what is cut away is vacuum. Several clips all hold.
+/// A cut through the volume; what is cut away is vacuum. If there are several clips, all apply.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Clip {

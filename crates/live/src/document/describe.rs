@@ -1,10 +1,10 @@
-//! What may stand at a place of the document, in words.
+//! Descriptions of what a place in the document may hold.
 
 use serde_json::Value;
 
 use super::node::Node;
 
-/// What may stand at a place, as an error names it.
+/// What a place may hold, as described in messages.
 pub(super) fn describe(node: Node) -> String {
     let choices = node.choices();
     let words: Vec<_> = choices.iter().filter_map(|choice| quoted(choice.keyword("const")?)).collect();
@@ -28,7 +28,7 @@ fn describe_choice(node: Node) -> String {
     match kind {
         Some("number") => format!("a number{}", describe_range(node)),
         Some("integer") => format!("a whole number{}", describe_range(node)),
-        Some("string") => "a text in quotes".to_owned(),
+        Some("string") => "text in quotes".to_owned(),
         Some("boolean") => "true or false".to_owned(),
         Some("array") => describe_list(node),
         _ => "a table".to_owned(),
@@ -93,11 +93,11 @@ mod tests {
     }
 
     #[test]
-    fn each_kind_of_place_has_words() {
+    fn each_kind_of_place_is_described() {
         for (path, words) in [
             ("version", "a whole number that is 1"),
             ("volume", "a table"),
-            ("volume.path", "a text in quotes"),
+            ("volume.path", "text in quotes"),
             ("volume.interpolation", "\"linear\" or \"nearest\""),
             ("volume.raw.spacing", "a list of 3 numbers above 0"),
             ("transfer_function.points", "a list of at least 1 tables"),

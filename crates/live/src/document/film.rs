@@ -40,7 +40,7 @@ pub enum Tone {
     Agx,
     /// No curve: clipped at 1.
     Linear,
-    /// The curve of Reinhard on luminance.
+    /// Reinhard's curve, applied to luminance.
     Reinhard,
     /// A fit of the ACES film curve.
     Aces,
@@ -63,7 +63,7 @@ impl Tone {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Background {
-    /// The environment light, where it is visible, else black.
+    /// The environment light if it is visible, otherwise black.
     #[default]
     Environment,
     /// Nothing: the picture has transparent pixels.

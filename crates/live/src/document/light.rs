@@ -1,11 +1,11 @@
-//! Lights: sources only, invisible to the camera unless they are a visible environment.
+//! Lights: pure sources, which the camera does not see, except a visible environment.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::shape::{Color, ConeAngle, Position, Positive, Vector};
 
-/// A light. It blocks nothing and casts no shadow, and may lie inside the volume.
+/// A light. It blocks no light, casts no shadow, and may be inside the volume.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Light {
@@ -17,27 +17,27 @@ pub enum Light {
         /// Direction in which the light travels; any length but 0.
         #[schemars(with = "Vector")]
         direction: [f32; 3],
-        /// Irradiance of a surface that faces the light, in W m^-2.
+        /// Irradiance on a surface that faces the light, in W m^-2.
         #[schemars(with = "Color")]
         irradiance: [f32; 3],
-        /// Full angle of the cone that the light comes from, in degrees; 0 is sharp.
+        /// Full angle of the cone that the light comes from, in degrees; 0 makes shadows sharp.
         #[serde(default)]
         #[schemars(with = "ConeAngle")]
         angle: f32,
     },
-    /// A point that shines equally into all directions.
+    /// A point that shines equally in all directions.
     Point {
         /// Name by which edits find the light.
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
-        /// Place of the light, in world units.
+        /// Position of the light, in world units.
         #[schemars(with = "Position")]
         position: [f64; 3],
         /// Radiant intensity, in W sr^-1.
         #[schemars(with = "Color")]
         intensity: [f32; 3],
     },
-    /// A rectangle that shines from the side of its target.
+    /// A rectangle that shines only from the side facing its target.
     Rect {
         /// Name by which edits find the light.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -48,7 +48,7 @@ pub enum Light {
         /// Point that the light faces.
         #[schemars(with = "Position")]
         target: [f64; 3],
-        /// Direction that is up on the rectangle: its height runs along it; when omitted, the world's up.
+        /// Up direction of the rectangle, along which its height is measured; when omitted, the world's up.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Vector>")]
         up: Option<[f32; 3]>,
@@ -59,7 +59,7 @@ pub enum Light {
         #[schemars(with = "Color")]
         radiance: [f32; 3],
     },
-    /// A disk that shines from the side of its target.
+    /// A disk that shines only from the side facing its target.
     Disk {
         /// Name by which edits find the light.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -92,24 +92,24 @@ pub enum Light {
         #[schemars(with = "Color")]
         radiance: [f32; 3],
     },
-    /// Light from all around: one `radiance`, or a `map`; exactly one of them.
+    /// Light from all around: exactly one of a constant `radiance` and a `map`.
     #[schemars(extend("oneOf" = [{ "required": ["radiance"] }, { "required": ["map"] }]))]
     Environment {
         /// Name by which edits find the light.
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
-        /// Radiance from everywhere, in W m^-2 sr^-1.
+        /// Radiance from every direction, in W m^-2 sr^-1.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Color>")]
         radiance: Option<[f32; 3]>,
-        /// Picture of the surroundings in latitude and longitude, relative to the document; OpenEXR or Radiance HDR.
+        /// File of a latitude-longitude picture of the surroundings, relative to the document; OpenEXR or Radiance HDR.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(length(min = 1))]
         map: Option<String>,
-        /// Turn of the surroundings about the world's up, in degrees.
+        /// Rotation of the surroundings about the world's up, in degrees.
         #[serde(default)]
         rotation: f32,
-        /// Whether the camera sees the environment; otherwise it shows black.
+        /// Whether the camera sees the environment; if not, it sees black.
         #[serde(default = "yes")]
         visible: bool,
     },

@@ -1,11 +1,11 @@
-//! The medium: how dense the matter is, and how it turns light.
+//! The medium: how dense the matter is, and how it scatters light.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::shape::{MajorantCell, MeanCosine, NonNegative};
 
-/// What the whole volume shares: the scale of its extinction, and how it scatters.
+/// Properties of the whole volume: the scale of its extinction, and how it scatters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Medium {
@@ -13,19 +13,20 @@ pub struct Medium {
     #[schemars(with = "NonNegative")]
     pub density: f32,
 
-    /// Phase function of matter that scatters as a cloud.
+    /// Phase function of matter that scatters like a cloud.
     pub phase: Phase,
 
-    /// Reflectance function of matter that scatters as a surface.
+    /// BRDF of matter that scatters like a surface.
     pub brdf: Brdf,
 
-    /// How soon a gradient makes a surface: the probability of one is
-    /// `surface * (1 - exp(-gradient_factor * |grad v| * h / range))`, h the voxel's edge and range the robust data range.
+    /// How readily a gradient acts as a surface: light scatters from a surface with probability
+    /// `surface * (1 - exp(-gradient_factor * |grad v| * h / range))`, where h is the voxel's edge and range the robust
+    /// data range.
     #[schemars(with = "NonNegative")]
     pub gradient_factor: f32,
 
-    /// Edge, in voxels, of the cells that each keep their own majorant of the extinction; 0 is one majorant for the whole
-    /// volume. It changes the speed, never the expected picture.
+    /// Edge, in voxels, of the cells that each have their own majorant of the extinction; 0 means one majorant for the
+    /// whole volume. It changes the speed, never the expected picture.
     #[schemars(with = "MajorantCell")]
     pub majorant_cell: u32,
 }
@@ -42,17 +43,17 @@ impl Default for Medium {
     }
 }
 
-/// Phase function: the density over solid angle into which a cloud turns light.
+/// Phase function: the density over solid angle of the directions into which a cloud scatters light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 #[schemars(extend("default" = { "type": "isotropic" }))]
 pub enum Phase {
-    /// The same into all directions.
+    /// The same in all directions.
     #[default]
     Isotropic,
     /// One lobe, set by its mean cosine.
     HenyeyGreenstein {
-        /// Mean cosine of the angle of deflection, between -1 and 1; positive is forward.
+        /// Mean cosine of the scattering angle, between -1 and 1; positive is forward.
         #[serde(default)]
         #[schemars(with = "MeanCosine")]
         g: f32,
@@ -66,7 +67,7 @@ pub enum Phase {
     },
 }
 
-/// Reflectance function of surfaces inside the volume; albedo, specular and roughness come from the transfer function.
+/// BRDF of surfaces inside the volume; albedo, specular and roughness come from the transfer function.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 #[schemars(extend("default" = { "type": "lambert" }))]
@@ -78,7 +79,7 @@ pub enum Brdf {
     AshikhminShirley,
     /// The two-parameter ABC model of measured, glossy materials.
     Abc {
-        /// Width of the lobe: the larger, the sharper.
+        /// Sharpness of the lobe: the larger, the narrower.
         #[serde(default = "default_width")]
         #[schemars(with = "NonNegative")]
         b: f32,

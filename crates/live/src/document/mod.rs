@@ -1,9 +1,10 @@
 //! The scene document: the text, TOML or JSON, in which users describe a scene, and the edits that change it.
 //!
-//! A document is first a [`Value`]: that is what edits ([`apply`], [`set()`]) work on. [`Document::from_value`] checks
-//! it against the [`schema()`], which is derived from the types here, then for what a schema cannot say, and so makes
-//! a [`Document`]: every key there or at its default, every number in its range. It mirrors the file; what is still
-//! open, such as an automatic camera, is decided when the scene is built, since that needs the volume.
+//! A document is first a [`Value`], which is what edits ([`apply`], [`set()`]) work on. [`Document::from_value`] checks
+//! it against the [`schema()`], which is derived from the types here, then against rules that a schema cannot express,
+//! and returns a [`Document`]: every key is given or at its default, every number is in its range. It mirrors the file;
+//! what the file leaves open, such as an automatic camera, is decided when the scene is built, since that needs the
+//! volume.
 //!
 //! ```
 //! use tyndall_live::document::{Document, apply};
@@ -77,19 +78,19 @@ pub struct Document {
     /// The matter that is rendered.
     pub volume: Volume,
 
-    /// What each data value looks like; when omitted, a preset fit to the volume's kind.
+    /// How each data value looks; when omitted, a preset that suits the kind of volume.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transfer_function: Option<TransferFunction>,
 
-    /// What the whole volume shares: the scale of its extinction, and how it scatters.
+    /// Properties of the whole volume: the scale of its extinction, and how it scatters.
     #[serde(default)]
     pub medium: Medium,
 
-    /// Lights, any number and any mix; when omitted, lights that show form. An empty list is darkness.
+    /// Lights, any number of any type; when omitted, a soft sun and a sky. An empty list is darkness.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lights: Option<Vec<Light>>,
 
-    /// From where the picture is taken; when omitted, an automatic view that fits the volume.
+    /// The viewpoint of the picture; when omitted, an automatic view that fits the volume.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera: Option<Camera>,
 
@@ -101,7 +102,7 @@ pub struct Document {
     #[serde(default)]
     pub render: Render,
 
-    /// Cuts through the volume; all of them hold.
+    /// Cuts through the volume; all of them apply.
     #[serde(default)]
     pub clip: Vec<Clip>,
 }
@@ -110,7 +111,7 @@ impl Document {
     /// Reads a document in TOML.
     ///
     /// # Errors
-    /// [`DocumentError`] if the text is no TOML, or no scene document.
+    /// [`DocumentError`] if the text is not TOML, or not a scene document.
     pub fn from_toml(text: &str) -> Result<Self, DocumentError> {
         Self::from_value(value_from_toml(text)?)
     }
@@ -118,7 +119,7 @@ impl Document {
     /// Reads a document in JSON.
     ///
     /// # Errors
-    /// [`DocumentError`] if the text is no JSON, or no scene document.
+    /// [`DocumentError`] if the text is not JSON, or not a scene document.
     pub fn from_json(text: &str) -> Result<Self, DocumentError> {
         Self::from_value(value_from_json(text)?)
     }
@@ -126,7 +127,7 @@ impl Document {
     /// Checks a value, and reads it as a document.
     ///
     /// # Errors
-    /// [`DocumentError::Content`] with what is wrong: where, what was found, what was expected, and the mend.
+    /// [`DocumentError::Content`] with what is wrong: where, what was found, what was expected, and how to fix it.
     pub fn from_value(mut value: Value) -> Result<Self, DocumentError> {
         move_old_keys(&mut value)?;
         check::check(&mut value)?;
@@ -141,7 +142,7 @@ impl Document {
         Ok(document)
     }
 
-    /// Whether two documents are equal but for their cameras.
+    /// Whether two documents are equal except for their cameras.
     pub(crate) fn equals_but_for_camera(&self, other: &Self) -> bool {
         let Self { version, volume, transfer_function, medium, lights, camera: _, film, render, clip } = self;
         (version, volume, medium, film) == (&other.version, &other.volume, &other.medium, &other.film)
@@ -149,10 +150,10 @@ impl Document {
             && (render, clip) == (&other.render, &other.clip)
     }
 
-    /// The document as a value, with every default written out; [`Self::from_value`] makes an equal document of it.
+    /// The document as a value, with every default written out; [`Self::from_value`] turns it into an equal document.
     ///
     /// # Panics
-    /// Never: tables of plain keys always have a value.
+    /// Never: a document always serializes to a JSON value.
     #[must_use]
     pub fn to_value(&self) -> Value {
         number::to_value(self).expect("tables of plain keys")

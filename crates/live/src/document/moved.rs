@@ -1,14 +1,14 @@
-//! Keys that older versions had elsewhere: they are still read, since pictures carry them in their metadata.
+//! Keys that older versions had at other paths: they are still read, since pictures have them in their metadata.
 
 use serde_json::{Map, Value};
 use tyndall::integrator::{METHODS, MethodEntry, MovedKey};
 
 use super::error::{DocumentError, Problem};
 
-/// Moves what a document, or a patch of one, has at a key's old place to where it stands now; gives a note for each.
+/// Moves the values at old paths in a document, or in a patch to one, to their current paths; returns a note for each.
 ///
 /// # Errors
-/// [`DocumentError::Content`] where there is something at both places; the document then is as it was.
+/// [`DocumentError::Content`] if there is a value at both paths; the document is then unchanged.
 pub fn move_old_keys(document: &mut Value) -> Result<Vec<String>, DocumentError> {
     let mut changed = document.clone();
     let mut notes = Vec::new();
@@ -17,10 +17,10 @@ pub fn move_old_keys(document: &mut Value) -> Result<Vec<String>, DocumentError>
         let (old, now) = (old_path(method, moved), moved.now);
         let parts: Vec<_> = now.split('.').collect();
         if put(&mut changed, &parts, value).is_err() {
-            let problem = Problem::new(old, "a value", format!("nothing, since `{now}` is there too"));
-            return Err(DocumentError::one(problem.with_mend("leave the old key out")));
+            let problem = Problem::new(old, "a value", format!("nothing, since `{now}` is given too"));
+            return Err(DocumentError::one(problem.with_fix("leave the old key out")));
         }
-        notes.push(format!("`{old}` is `{now}` now: it was read as that"));
+        notes.push(format!("`{old}` is now `{now}` and was read as such"));
     }
     if !notes.is_empty() {
         *document = changed;
@@ -28,7 +28,7 @@ pub fn move_old_keys(document: &mut Value) -> Result<Vec<String>, DocumentError>
     Ok(notes)
 }
 
-/// Where a key stands now that may stand elsewhere in older documents.
+/// The current path of a key that may be at another path in older documents.
 pub(super) fn present_path(path: &str) -> &str {
     all().find(|(method, moved)| old_path(method, moved) == path).map_or(path, |(_, moved)| moved.now)
 }
@@ -41,15 +41,15 @@ fn old_path(method: &MethodEntry, moved: &MovedKey) -> String {
     format!("render.{}.{}", method.table(), moved.key)
 }
 
-/// Takes out the value that a path of keys leads to.
+/// Removes and returns the value at a path of keys.
 fn take(value: &mut Value, [outer, inner, key]: &[&str; 3]) -> Option<Value> {
     value.get_mut(outer)?.get_mut(inner)?.as_object_mut()?.shift_remove(*key)
 }
 
-/// Puts a value where a path of keys leads, through tables that are made where they are missing.
+/// Puts a value at a path of keys, and creates missing tables on the way.
 ///
 /// # Errors
-/// If there is something already.
+/// If there is a value already, or something on the way is not a table.
 fn put(target: &mut Value, path: &[&str], value: Value) -> Result<(), ()> {
     let Some((key, rest)) = path.split_first() else { return Err(()) };
     if target.is_null() {
@@ -81,7 +81,7 @@ mod tests {
             let notes = move_old_keys(&mut value).unwrap();
             assert_eq!(
                 notes,
-                ["`render.path.majorant_cell` is `medium.majorant_cell` now: it was read as that"]
+                ["`render.path.majorant_cell` is now `medium.majorant_cell` and was read as such"]
             );
             assert_eq!(value["medium"]["majorant_cell"], 4);
             assert_eq!(value.pointer("/render/path/majorant_cell"), None);

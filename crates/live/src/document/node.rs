@@ -1,10 +1,10 @@
-//! A place in the document's JSON Schema, and the way from it to the places below.
+//! Nodes of the document's JSON Schema, and how to get from a node to those below it.
 
 use serde_json::{Map, Value};
 
 use super::schema::{self, TAG};
 
-/// The schema of one place of the document.
+/// The schema of one place in the document.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node(&'static Value);
 
@@ -32,7 +32,7 @@ impl Node {
         self.keyword(name).and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str)
     }
 
-    /// The schemas of which a value must match one, down to those that have no further choice.
+    /// The schemas of which a value must match one, with nested choices expanded.
     pub(super) fn choices(self) -> Vec<Self> {
         let choices = ["oneOf", "anyOf"].iter().find_map(|name| self.keyword(name)?.as_array());
         match choices {
@@ -43,7 +43,7 @@ impl Node {
         }
     }
 
-    /// Whether this is a table, whose own `oneOf` then is a choice between keys.
+    /// Whether this is a table; a table's own `oneOf` is a choice between keys.
     pub(super) fn is_table(self) -> bool {
         self.keyword("properties").is_some()
     }
@@ -64,12 +64,12 @@ impl Node {
         if choices.iter().all(|choice| choice.tag().is_some()) { choices } else { Vec::new() }
     }
 
-    /// The type that a tagged union has where none is named.
+    /// The type that a tagged union has by default.
     pub(super) fn default_tag(self) -> Option<&'static str> {
         self.keyword("default")?.get(TAG)?.as_str()
     }
 
-    /// The schema of this table: of a tagged union, the variant of the type that it names or has by default.
+    /// The schema of `table`: in a tagged union, the variant of the type that `table` gives, or of the default type.
     pub(super) fn table(self, table: &Map<String, Value>) -> Option<Self> {
         let variants = self.variants();
         if variants.is_empty() {
@@ -104,7 +104,7 @@ impl Node {
         self.strings("required")
     }
 
-    /// The two keys of which this table has one or none, or, where `needed`, exactly one.
+    /// The two keys of which this table has at most one or, if `needed`, exactly one.
     pub(super) fn alternatives(self) -> Option<Alternatives> {
         if let Some(not) = self.keyword("not") {
             let mut keys = Self(not).required();
@@ -115,7 +115,7 @@ impl Node {
         Some(Alternatives { keys: [key()?, key()?], needed: true })
     }
 
-    /// The keys that mean something only beside another one, with that one: `raw` beside `path`.
+    /// The keys that are only allowed with another one, each with that one, such as `raw` with `path`.
     pub(super) fn companions(self) -> impl Iterator<Item = (&'static str, &'static str)> {
         let pairs = self.keyword("dependentRequired").and_then(Value::as_object).into_iter().flatten();
         pairs.filter_map(|(companion, leader)| Some((companion.as_str(), leader.get(0)?.as_str()?)))

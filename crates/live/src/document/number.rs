@@ -18,7 +18,7 @@ pub(super) fn to_value(document: &impl Serialize) -> Result<Value, serde_json::E
     Ok(value)
 }
 
-/// Replaces the single-precision numbers of a value by their shortest decimals, which stand in `short`.
+/// Replaces single-precision numbers by their shortest decimals, which `short` has at the same places.
 fn shorten_as(value: &mut Value, short: &Value) {
     match (value, short) {
         (Value::Number(number), Value::Number(decimal)) if number != decimal => {
@@ -36,7 +36,7 @@ fn shorten_as(value: &mut Value, short: &Value) {
     }
 }
 
-/// The same of a value all of whose numbers are single-precision ones.
+/// The same for a value that has only single-precision numbers.
 pub(super) fn shorten(value: &mut Value) {
     match value {
         Value::Number(number) => {
@@ -52,8 +52,8 @@ pub(super) fn shorten(value: &mut Value) {
 
 /// The shortest decimal of a number that single precision holds exactly.
 ///
-/// A decimal may round to double and then to single precision otherwise than to single precision at once (7.038531e-26
-/// does); such a number keeps its long notation.
+/// Rounding a decimal to double and then to single precision may differ from rounding it directly to single precision
+/// (as for 7.038531e-26); such a number keeps its long notation.
 fn shortest(exact: f64) -> Option<Number> {
     let single = cast::single(exact);
     let decimal = single.to_string().parse().ok()?;

@@ -7,14 +7,14 @@ use super::schema::TAG;
 
 /// The document after an edit.
 ///
-/// The patch is merged as RFC 7396 says: tables are merged, arrays and all else are replaced whole, null deletes a key and
-/// so restores its default. Beyond that
+/// The patch is merged as RFC 7396 says: tables are merged, everything else, arrays included, is replaced whole, and
+/// null deletes a key and so restores its default. In addition,
 /// - a patch that changes a `type` drops the keys that the new type lacks;
-/// - of two alternatives, such as `preset` and `points`, the one patched replaces the other;
-/// - a key that means something only beside another one, as `raw` does beside `path`, goes with that one.
+/// - of two alternatives, such as `preset` and `points`, the one in the patch replaces the other;
+/// - a key that is only allowed with another one, such as `raw` with `path`, is removed with that one.
 ///
-/// Keys that the patch itself brings always stay, so that [`Document::from_value`](super::Document::from_value) can find
-/// fault with them.
+/// Keys that the patch itself sets always stay, so that [`Document::from_value`](super::Document::from_value) can
+/// report what is wrong with them.
 #[must_use]
 pub fn apply(document: &Value, patch: &Value) -> Value {
     let mut patched = document.clone();
@@ -22,7 +22,7 @@ pub fn apply(document: &Value, patch: &Value) -> Value {
     patched
 }
 
-/// Merges `patch` into `target`, whose schema is `node` where it has one.
+/// Merges `patch` into `target`, whose schema is `node` if it has one.
 pub(super) fn merge(target: &mut Value, patch: &Value, node: Option<Node>) {
     let Value::Object(changes) = patch else {
         *target = patch.clone();
@@ -40,7 +40,7 @@ pub(super) fn merge(target: &mut Value, patch: &Value, node: Option<Node>) {
     }
 }
 
-/// The table that `value` is, or else becomes.
+/// The table in `value`; anything else is first replaced by an empty table.
 fn as_table(value: &mut Value) -> &mut Map<String, Value> {
     if !value.is_object() {
         *value = Value::Object(Map::new());
@@ -51,7 +51,7 @@ fn as_table(value: &mut Value) -> &mut Map<String, Value> {
     }
 }
 
-/// Removes from `table` what the `changes` to it exclude, and returns the schema that it has after them.
+/// Removes the keys of `table` that `changes` exclude, and returns the schema of the table after the changes.
 pub(super) fn make_way(
     table: &mut Map<String, Value>,
     changes: &Map<String, Value>,

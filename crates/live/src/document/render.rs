@@ -21,7 +21,7 @@ pub struct Render {
     pub samples: u32,
     /// Seed of the random numbers.
     pub seed: u64,
-    /// Which of [`METHODS`] is used.
+    /// Index in [`METHODS`] of the method that is used.
     method: usize,
     /// Every method's settings, in the order of [`METHODS`].
     settings: Vec<MethodChoice>,
@@ -42,18 +42,18 @@ impl Render {
         &self.settings[self.method]
     }
 
-    /// The method that is used, as the list of methods has it.
+    /// The entry of the method that is used in the list of methods.
     #[must_use]
     pub fn entry(&self) -> &'static MethodEntry {
         &METHODS[self.method]
     }
 
-    /// The settings of every method, used or not, beside the keys of their tables.
+    /// Every method with its settings, used or not.
     pub(super) fn tables(&self) -> impl Iterator<Item = (&'static MethodEntry, &MethodChoice)> {
         METHODS.iter().zip(&self.settings)
     }
 
-    /// Cuts the settings of every method down to a draft's, see [`tyndall::integrator::Method::draft`].
+    /// Reduces the settings of every method to those of a draft, see [`tyndall::integrator::Method::draft`].
     pub fn draft(&mut self) {
         for (entry, settings) in METHODS.iter().zip(&mut self.settings) {
             *settings = entry.draft(settings);
@@ -99,7 +99,7 @@ impl From<Render> for Map<String, Value> {
     }
 }
 
-/// How the picture is computed: the method, its effort, and its own settings.
+/// How the picture is computed: the method, its effort, and the settings of every method.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 struct Common {
@@ -172,6 +172,6 @@ impl JsonSchema for MethodName {
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         let word = |entry: &MethodEntry| json_schema!({ "type": "string", "const": entry.name, "description": entry.about });
         let words: Vec<Schema> = METHODS.iter().map(word).collect();
-        json_schema!({ "oneOf": words, "description": "The method by which light is followed." })
+        json_schema!({ "oneOf": words, "description": "The method that computes the light." })
     }
 }

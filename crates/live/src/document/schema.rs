@@ -29,7 +29,7 @@ pub(super) fn shared() -> &'static Value {
     &SCHEMA
 }
 
-/// Turns what the derivation says about the types into what holds for the document.
+/// Changes what is derived from the types to what holds for the document.
 fn tidy(schema: &mut Schema) {
     let Some(keywords) = schema.as_object_mut() else { return };
     drop_null(keywords);
@@ -42,7 +42,7 @@ fn tidy(schema: &mut Schema) {
     }
 }
 
-/// A key without a value is left out, never null.
+/// Removes null from the allowed types: a key without a value is left out, never null.
 fn drop_null(keywords: &mut Map<String, Value>) {
     if let Some(Value::Array(types)) = keywords.get_mut("type") {
         types.retain(|name| name != "null");
@@ -63,7 +63,7 @@ fn drop_null(keywords: &mut Map<String, Value>) {
     }
 }
 
-/// In a union with a default, the type of that default may be left out.
+/// In a union with a default, makes the type optional for that default.
 fn name_default_type(keywords: &mut Map<String, Value>) {
     let Some(tag) = keywords.get("default").and_then(|default| default.get(TAG)).cloned() else { return };
     let Some(Value::Array(variants)) = keywords.get_mut("oneOf") else { return };

@@ -10,15 +10,15 @@ use tyndall::message::{excerpt, quoted};
 
 /// Sets one key of a document: `medium.density=0.3`, `lights.0.radiance=[1,2,3]`.
 ///
-/// PATH is keys and list indices between dots; tables and lists on the way are made where they are missing, and the index
-/// after a list's last appends. VALUE is JSON, else a text; it replaces what stood there, and null removes it. Types and
-/// alternatives give way as in [`apply`](super::apply).
+/// PATH is keys and list indices separated by dots; missing tables and lists on the way are created, and the index
+/// after a list's last one appends an item. VALUE is JSON, or else text; it replaces the old value, and null removes
+/// it. Types and alternatives are replaced as in [`apply`](super::apply).
 ///
 /// # Errors
-/// [`DocumentError::Content`] if the assignment has no `=`, or its path leads nowhere; the document then is as it was.
-/// Whether the value fits is for [`Document::from_value`](super::Document::from_value) to say, once all is set.
+/// [`DocumentError::Content`] if the assignment has no `=`, or its path leads nowhere; the document is then unchanged.
+/// The value itself is checked later, by [`Document::from_value`](super::Document::from_value).
 pub fn set(document: &mut Value, assignment: &str) -> Result<(), DocumentError> {
-    /// No path of the schema is as long; each part nests the document deeper.
+    /// Every path in the schema is shorter; each part nests the document one level deeper.
     const LONGEST: usize = 16;
 
     let expected = "PATH=VALUE, such as medium.density=0.3";
@@ -36,7 +36,7 @@ pub fn set(document: &mut Value, assignment: &str) -> Result<(), DocumentError> 
     Ok(())
 }
 
-/// Sets the place that `parts` lead to from `target`, which stands at `path` and has the schema `node`.
+/// Sets the value at `parts` below `target`, which is at `path` and has the schema `node`.
 fn assign(
     target: &mut Value,
     parts: &[&str],
@@ -72,7 +72,7 @@ fn assign(
             let Some(index) = index else {
                 let problem =
                     Problem::new(below, quoted(part), format!("an index into {} items", items.len()));
-                return Err(DocumentError::one(problem.with_mend("the index after the last appends")));
+                return Err(DocumentError::one(problem.with_fix("the index after the last one appends")));
             };
             if removes {
                 items.remove(index);
@@ -92,7 +92,8 @@ fn assign(
     }
 }
 
-/// What a missing place holds before something below it is set: for a list that by default is not empty, its default.
+/// What to create at a missing place before something below it is set: a list with its default items, if it has any, or
+/// else an empty list or table.
 fn empty(node: Option<Node>) -> Value {
     match node.and_then(Node::list) {
         Some(list) => list.keyword("default").cloned().unwrap_or_else(|| Value::Array(Vec::new())),

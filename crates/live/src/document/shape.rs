@@ -1,6 +1,6 @@
 //! The shapes that values of the document take in its JSON Schema: numbers with a range, vectors, colours.
 //!
-//! These types exist for the schema alone and have no values; the document's own fields are plain numbers and arrays.
+//! These types exist only for the schema and have no values; the document's own fields are plain numbers and arrays.
 
 use std::borrow::Cow;
 
@@ -36,9 +36,9 @@ shapes! {
     Positive = { "type": "number", "format": "float", "exclusiveMinimum": 0 };
     /// A number above 0 in double precision.
     PositiveDouble = { "type": "number", "format": "double", "exclusiveMinimum": 0 };
-    /// A share.
+    /// A fraction from 0 to 1.
     Fraction = { "type": "number", "format": "float", "minimum": 0, "maximum": 1 };
-    /// The shape of a lobe; at its ends the lobe is no longer a function.
+    /// The shape of a lobe; at -1 and 1, which are excluded, the lobe is no longer a function.
     MeanCosine = { "type": "number", "format": "float", "exclusiveMinimum": -1, "exclusiveMaximum": 1 };
     /// The full angle of a cone, in degrees.
     ConeAngle = { "type": "number", "format": "float", "minimum": 0, "maximum": 180 };
@@ -46,7 +46,7 @@ shapes! {
     FieldOfView = { "type": "number", "format": "float", "exclusiveMinimum": 0, "exclusiveMaximum": 180 };
     /// An angle above the horizon, in degrees.
     Elevation = { "type": "number", "format": "float", "minimum": -90, "maximum": 90 };
-    /// Stops; beyond these ends powers of two leave single precision.
+    /// Stops, limited so that powers of two stay in the range of single precision.
     Exposure = { "type": "number", "format": "float", "minimum": -100, "maximum": 100 };
     /// A number of scattering events.
     ScatteringOrder = { "type": "integer", "format": "uint32", "minimum": 0, "maximum": 1_000_000 };
@@ -70,7 +70,7 @@ shapes! {
         "minItems": 3,
         "maxItems": 3
     };
-    /// Linear red, green and blue from 0 to 1e18; one number is grey. The end is [`tyndall::light::BRIGHTEST`].
+    /// Linear red, green and blue from 0 to 1e18; one number is grey. The upper end is [`tyndall::light::BRIGHTEST`].
     Color = {
         "oneOf": [
             { "type": "number", "format": "float", "minimum": 0, "maximum": 1e18 },
@@ -82,7 +82,7 @@ shapes! {
             }
         ]
     };
-    /// A share per colour channel; one number is grey.
+    /// A fraction per colour channel; one number is grey.
     FractionColor = {
         "oneOf": [
             { "type": "number", "format": "float", "minimum": 0, "maximum": 1 },

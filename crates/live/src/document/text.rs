@@ -1,4 +1,4 @@
-//! From the text of a document, TOML or JSON, to its value.
+//! Parses the text of a document, TOML or JSON, to its value.
 
 use serde_json::{Map, Number, Value};
 
@@ -26,8 +26,8 @@ pub fn value_from_json(text: &str) -> Result<Value, DocumentError> {
 /// Reads TOML.
 ///
 /// # Errors
-/// [`DocumentError::Syntax`] with line and column; [`DocumentError::Content`] if a number is infinite or not a number,
-/// which TOML can write.
+/// [`DocumentError::Syntax`] with line and column; [`DocumentError::Content`] if a number is infinite or NaN, which
+/// TOML allows.
 pub fn value_from_toml(text: &str) -> Result<Value, DocumentError> {
     let table: toml::Table = toml::from_str(text).map_err(|error| {
         let start = error.span().map_or(0, |span| span.start);
@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_languages_say_the_same() {
+    fn both_languages_give_the_same_value() {
         let toml = value_from_toml("a = 1\nb = [1.5, true]\n[c]\nd = \"x\"\n[[e]]\nf = 2\n").unwrap();
         let json =
             value_from_json(r#"{ "a": 1, "b": [1.5, true], "c": { "d": "x" }, "e": [{ "f": 2 }] }"#).unwrap();
@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_of_syntax_tells_line_and_column() {
+    fn a_syntax_error_gives_line_and_column() {
         let error = value_from_toml("version = 1\n[volume]\npath = head.nrrd\n").unwrap_err();
         assert!(
             matches!(error, DocumentError::Syntax { language: "TOML", line: 3, column: 8, .. }),
@@ -119,12 +119,12 @@ mod tests {
     }
 
     #[test]
-    fn a_date_is_read_as_a_text() {
+    fn a_date_is_read_as_text() {
         assert_eq!(value_from_toml("a = 2026-01-01").unwrap(), json!({ "a": "2026-01-01" }));
     }
 
     #[test]
-    fn a_byte_order_mark_is_no_fault() {
+    fn a_byte_order_mark_is_accepted() {
         assert!(value_from_json("\u{feff}{}").is_ok());
         assert!(value_from_toml("\u{feff}a = 1").is_ok());
     }

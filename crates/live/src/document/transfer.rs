@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::shape::{Color, DataValue, Fraction, FractionColor, Positive};
 
-/// What each data value looks like: a named `preset`, or `points`; without either, a preset fit to the volume's kind.
+/// How each data value looks: a named `preset`, or `points`; with neither, a preset that suits the kind of volume.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("not" = { "required": ["preset", "points"] }))]
@@ -15,8 +15,8 @@ pub struct TransferFunction {
     #[schemars(length(min = 1))]
     pub preset: Option<String>,
 
-    /// Points of a function that is piecewise linear in the data value and clamped outside; values ascend.
-    /// Two points at one value are a jump, of which the later holds from there.
+    /// Points of a function that is piecewise linear in the data value and clamped outside; values must
+    /// ascend. Two points at one value are a jump: from that value on, the later one applies.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(length(min = 1))]
     pub points: Option<Vec<TransferPoint>>,
@@ -26,15 +26,15 @@ pub struct TransferFunction {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TransferPoint {
-    /// Data value, in the file's meaning (CT: Hounsfield units).
+    /// Data value, in the file's units (for CT, Hounsfield units).
     #[schemars(with = "DataValue")]
     pub value: f64,
 
-    /// Share of `medium.density` that is the extinction here, from 0 to 1; not alpha per step.
+    /// Extinction at this value as a fraction of `medium.density`, from 0 to 1; not alpha per step.
     #[schemars(with = "Fraction")]
     pub opacity: f32,
 
-    /// Scattered share of the extinction, per colour channel.
+    /// Scattered fraction of the extinction, per colour channel.
     #[serde(default = "default_albedo")]
     #[schemars(with = "FractionColor")]
     pub albedo: [f32; 3],
@@ -44,7 +44,7 @@ pub struct TransferPoint {
     #[schemars(with = "Color")]
     pub emission: [f32; 3],
 
-    /// How far matter with a gradient acts as a surface (`medium.brdf`) instead of a cloud (`medium.phase`).
+    /// Degree to which matter with a gradient acts as a surface (`medium.brdf`) instead of a cloud (`medium.phase`).
     #[serde(default)]
     #[schemars(with = "Fraction")]
     pub surface: f32,
@@ -66,7 +66,7 @@ pub struct TransferPoint {
 }
 
 impl TransferPoint {
-    /// A point whose other quantities stand at their defaults.
+    /// A point whose other quantities have their defaults.
     #[must_use]
     pub fn new(value: f64, opacity: f32) -> Self {
         Self {

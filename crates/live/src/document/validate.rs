@@ -1,14 +1,14 @@
-//! What a schema cannot say: how the values of a document must fit each other.
+//! Checks that a schema cannot express: how the values of a document must fit together.
 
 use super::error::{DocumentError, Problem, Problems, join};
 use super::{Camera, Clip, Document, Film, Light, TransferPoint};
 use tyndall::math::{DVec3, cast};
 
-/// Most pixels of a film; whether they fit the memory is for the renderer to find out.
+/// Most pixels of a film; whether they fit in memory is checked later.
 const MOST_PIXELS: u64 = 1 << 28;
 
 /// # Errors
-/// [`DocumentError::Content`] with every problem, unless they are many.
+/// [`DocumentError::Content`] with every problem, up to a limit.
 pub(super) fn validate(document: &Document) -> Result<(), DocumentError> {
     let mut problems = Problems::default();
     let points = document.transfer_function.as_ref().and_then(|function| function.points.as_deref());
@@ -37,8 +37,8 @@ fn validate_points(points: &[TransferPoint], problems: &mut Problems) {
     for (i, pair) in points.windows(2).enumerate() {
         let [before, here] = [&pair[0], &pair[1]].map(|point| point.value);
         if here < before {
-            let problem = Problem::new(path(i + 1), format!("{here} after {before}"), "values that ascend");
-            problems.push(problem.with_mend("order the points by value"));
+            let problem = Problem::new(path(i + 1), format!("{here} after {before}"), "ascending values");
+            problems.push(problem.with_fix("order the points by value"));
         }
     }
     for (i, triple) in points.windows(3).enumerate() {
@@ -46,10 +46,8 @@ fn validate_points(points: &[TransferPoint], problems: &mut Problems) {
         // As the renderer holds values: in single precision.
         if triple.iter().all(|point| cast::single(point.value) == cast::single(here)) {
             let found = format!("a third point at {here}");
-            let problem =
-                Problem::new(path(i + 2), found, "at most two points at one value, which are a jump");
-            problems
-                .push(problem.with_mend("leave out the points between the first and the last of that value"));
+            let problem = Problem::new(path(i + 2), found, "at most two points at one value (a jump)");
+            problems.push(problem.with_fix("keep only the first and the last point at that value"));
         }
     }
 }
@@ -91,13 +89,13 @@ fn validate_clip(clip: &Clip, path: &str, problems: &mut Problems) {
                 let found =
                     format!("{} on axis {}, where max is {}", min[axis], ["x", "y", "z"][axis], max[axis]);
                 let problem = Problem::new(join(path, "min"), found, "a corner below max on every axis");
-                problems.push(problem.with_mend("give the lowest corner as min and the highest as max"));
+                problems.push(problem.with_fix("give the lowest corner as min and the highest as max"));
             }
         }
     }
 }
 
-/// Holds something at `position` to looking at another place, with an `up` across the view.
+/// Requires something at `position` to look at a different point, with an `up` that is not along the view.
 fn require_view(
     position: [f64; 3],
     target: [f64; 3],
@@ -105,15 +103,15 @@ fn require_view(
     path: &str,
     problems: &mut Problems,
 ) {
-    /// Sine of the smallest angle between up and view at which single precision still tells left from right.
+    /// Sine of the smallest angle between up and view at which single precision can still distinguish left from right.
     const SMALLEST_SINE: f64 = 1e-4;
 
     let view = DVec3::from_array(target) - DVec3::from_array(position);
     if !LENGTHS.contains(&view.length()) {
         let found = format!("a distance of {:e} from `position`", view.length());
         let problem =
-            Problem::new(join(path, "target"), found, "another place than `position`, within reach");
-        return problems.push(problem.with_mend("move one of the two"));
+            Problem::new(join(path, "target"), found, "a point other than `position`, and not too far away");
+        return problems.push(problem.with_fix("move one of the two"));
     }
     let Some(up) = up else { return };
     let up_path = join(path, "up");
@@ -121,13 +119,12 @@ fn require_view(
         return require_direction(up, &up_path, problems);
     }
     if vector(up).normalize().cross(view.normalize()).length() < SMALLEST_SINE {
-        let problem =
-            Problem::new(up_path, format!("{up:?}, which is along the view"), "a direction across the view");
-        problems.push(problem.with_mend("point `up` along another axis"));
+        let problem = Problem::new(up_path, format!("{up:?}, which is along the view"), "another direction");
+        problems.push(problem.with_fix("point `up` along another axis"));
     }
 }
 
-/// Lengths whose squares, and those of their parts, single precision holds.
+/// Lengths of vectors for which single precision can hold the squares of the length and of the components.
 const LENGTHS: std::ops::RangeInclusive<f64> = 1e-15..=1e15;
 
 fn require_direction(direction: [f32; 3], path: &str, problems: &mut Problems) {

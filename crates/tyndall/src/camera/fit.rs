@@ -1,22 +1,22 @@
-//! A camera that fits a volume into the picture by itself.
+//! A camera placed automatically so that the volume fits into the picture.
 
 use super::{Camera, Lens, upright};
 use crate::math::Vec3;
 use crate::volume::{Grid, Space};
 
-/// From where an automatic camera looks.
+/// The viewpoint of an automatic camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AutoView {
-    /// Degrees about the up axis, from the front to the camera's right hand.
+    /// Degrees about the up axis, from the front towards the camera's right.
     pub azimuth: f32,
     /// Degrees above the horizon, -90 to 90.
     pub elevation: f32,
-    /// How much larger than fitting; positive.
+    /// Magnification relative to the fit; positive.
     pub zoom: f32,
 }
 
 impl AutoView {
-    /// An anatomical volume is seen from the patient's front; others a little from the side and above.
+    /// Anatomical volumes are seen from the patient's front, others from slightly to the side and above.
     #[must_use]
     pub fn default_for(space: Space) -> Self {
         match space {
@@ -26,10 +26,10 @@ impl AutoView {
     }
 }
 
-/// What an automatic camera sees through.
+/// The lens of an automatic camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FitLens {
-    /// With vanishing points; focused on the volume's middle unless told.
+    /// Perspective; focused on the volume's middle unless a focus distance is given.
     Perspective {
         /// Vertical field of view at zoom 1, degrees.
         fov: f32,
@@ -38,7 +38,7 @@ pub enum FitLens {
         /// As [`Lens::Perspective`].
         focus: Option<f32>,
     },
-    /// Parallel rays; as high as the volume needs unless told.
+    /// Parallel rays; as high as the volume needs unless a height is given.
     Orthographic {
         /// As [`Lens::Orthographic`], at zoom 1.
         height: Option<f32>,
@@ -48,7 +48,7 @@ pub enum FitLens {
 /// Share of the picture left free around the volume.
 const MARGIN: f32 = 0.04;
 
-/// Looks at the middle of a volume, the world's origin, from where all its corners just fit a film of the given shape.
+/// Looks at the middle of a volume, the world's origin, from where all its corners just fit on a film of the given shape.
 ///
 /// The front is -y for anatomical volumes (LPS: the patient's face) and +z for others.
 #[must_use]
@@ -63,23 +63,23 @@ pub fn fit(grid: &Grid, view: AutoView, up: Option<Vec3>, lens: FitLens, size: [
     let (sin_a, cos_a) = view.azimuth.to_radians().sin_cos();
     let (sin_e, cos_e) = view.elevation.to_radians().sin_cos();
     let outwards = (front * cos_a + right * sin_a) * cos_e + up * sin_e;
-    // Straight from above or below, up is what was ahead.
+    // Straight from above or below: the limit of the picture's up as the elevation approaches 90 or -90 degrees.
     let up = if cos_e.abs() < 1e-3 { -(front * cos_a + right * sin_a) * sin_e.signum() } else { up };
     let up = chosen_up.filter(|up| up.cross(outwards).length() > 1e-3 * up.length()).unwrap_or(up);
 
-    // From the directions alone: far from the volume, positions would have lost the bits.
+    // Computed from directions alone: far from the volume, differences of positions lose precision.
     let frame = upright(-outwards, up);
     let corners = grid.world_corners().map(|corner| frame.to_local(corner));
     let aspect = size[0] as f32 / size[1] as f32;
-    // Half the picture's height that a corner needs where it stands.
+    // Half the picture height that a corner needs at its distance.
     let needed = |corner: &Vec3| (corner.x.abs() / aspect).max(corner.y.abs()) / (1.0 - MARGIN);
     let most = |f: &dyn Fn(&Vec3) -> f32| corners.iter().map(f).fold(0.0, f32::max);
     let (distance, lens) = match lens {
         FitLens::Perspective { fov, aperture, focus } => {
             let tan = (0.5 * fov.to_radians()).tan();
             let distance = most(&|corner| needed(corner) / tan - corner.z);
-            // Zooming narrows the view and keeps the position, so that the perspective stays and the
-            // camera never enters the volume.
+            // Zooming narrows the view but keeps the position, so that the perspective stays the same and
+            // the camera never enters the volume.
             let fov = 2.0 * (tan / view.zoom).atan().to_degrees();
             (distance, Lens::Perspective { fov, aperture, focus: focus.unwrap_or(distance) })
         }
@@ -99,7 +99,7 @@ mod tests {
 
     const PERSPECTIVE: FitLens = FitLens::Perspective { fov: 35.0, aperture: 0.0, focus: None };
 
-    /// Film coordinates of a world point, from -1 to 1 over the picture.
+    /// Film coordinates of a world position, from -1 to 1 across the picture.
     fn project(camera: &Camera, p: Vec3, aspect: f32) -> [f32; 2] {
         let local = camera.frame.to_local(p - camera.position);
         let half = match camera.lens {
@@ -136,7 +136,7 @@ mod tests {
         let camera = fit(&grid, AutoView::default_for(Space::Anatomical), None, PERSPECTIVE, [100, 100]);
         assert!((camera.view() - Vec3::Y).length() < 1e-6);
         assert!((camera.frame.v - Vec3::Z).length() < 1e-6);
-        // The patient's left, +x, is to the right of the picture.
+        // The patient's left, +x, is on the right of the picture.
         assert!((camera.frame.u - Vec3::X).length() < 1e-6);
     }
 }

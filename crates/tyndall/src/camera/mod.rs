@@ -11,21 +11,21 @@ use crate::sampling::warp;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     position: Vec3,
-    /// `u` to the right of the picture, `v` to its top, `w` where the camera looks.
+    /// `u` points to the right of the picture, `v` to its top, `w` where the camera looks.
     frame: Frame,
     lens: Lens,
 }
 
-/// How a camera sees.
+/// The projection and its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lens {
-    /// With vanishing points.
+    /// Perspective.
     Perspective {
         /// Vertical field of view, degrees, between 0 and 180.
         fov: f32,
         /// Diameter of the thin lens, world units; 0 is a pinhole.
         aperture: f32,
-        /// Distance of what is sharp, along the view; positive.
+        /// Distance of the plane in focus along the view direction; positive.
         focus: f32,
     },
     /// Parallel rays.
@@ -36,22 +36,22 @@ pub enum Lens {
 }
 
 impl Camera {
-    /// `up` must not lie along the view; the document makes sure of both.
+    /// Position and target must differ, and `up` must not be parallel to the view; the document ensures both.
     ///
     /// # Panics
-    /// If position and target coincide or `up` lies along the view.
+    /// If position and target coincide or `up` is parallel to the view.
     #[must_use]
     pub fn new(position: Vec3, target: Vec3, up: Vec3, lens: Lens) -> Self {
         Self { position, frame: upright(target - position, up), lens }
     }
 
-    /// Where it stands.
+    /// The camera's position.
     #[must_use]
     pub fn position(&self) -> Vec3 {
         self.position
     }
 
-    /// Unit vector where it looks.
+    /// Unit vector in the view direction.
     #[must_use]
     pub fn view(&self) -> Vec3 {
         self.frame.w
@@ -63,13 +63,13 @@ impl Camera {
         self.lens
     }
 
-    /// The ray through a film position, in pixels from the top left of a film of `size` pixels, and a position
-    /// on the lens in the unit square.
+    /// The ray through a film position, in pixels from the top left of a film of `size` pixels, and a lens position,
+    /// in the unit square.
     #[inline]
     #[must_use]
     pub fn ray(&self, size: [u32; 2], film: [f32; 2], lens: [f32; 2]) -> Ray {
         let [width, height] = size.map(|n| n as f32);
-        // In halves of the picture's height, from its middle.
+        // In units of half the picture's height, from its middle.
         let x = (2.0 * film[0] - width) / height;
         let y = (height - 2.0 * film[1]) / height;
         let Frame { u, v, w } = self.frame;
@@ -92,11 +92,11 @@ impl Camera {
     }
 }
 
-/// The frame of a picture that looks along `view` with `up` upwards; directions of any length but zero.
+/// The frame of a camera that looks along `view` with `up` upwards; both of any length but zero.
 fn upright(view: Vec3, up: Vec3) -> Frame {
     let w = view.normalize();
     let u = w.cross(up.normalize());
-    assert!(u.length() > 1e-6, "a view along {view} with up {up} has no frame");
+    assert!(u.length() > 1e-6, "no camera frame for view direction {view} and up {up}");
     let u = u.normalize();
     Frame { u, v: u.cross(w), w }
 }
@@ -115,7 +115,7 @@ mod tests {
     fn the_top_left_of_the_film_is_up_and_to_the_left() {
         let pinhole = camera(Lens::Perspective { fov: 90.0, aperture: 0.0, focus: 10.0 });
         let corner = pinhole.ray(SIZE, [0.0, 0.0], [0.5; 2]).direction;
-        // 90 degrees over the height: at distance 1 the top is 1 up, the left side 2 to the left.
+        // 90 degrees vertically: at distance 1 the top edge is 1 up, the left edge 2 to the left.
         assert!((corner / -corner.z - Vec3::new(-2.0, 1.0, -1.0)).length() < 1e-5, "{corner}");
         let flat = camera(Lens::Orthographic { height: 4.0 });
         let ray = flat.ray(SIZE, [200.0, 100.0], [0.5; 2]);
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thin_lens_is_sharp_at_its_focus_alone() {
+    fn a_thin_lens_is_sharp_only_at_its_focus() {
         let lens = camera(Lens::Perspective { fov: 40.0, aperture: 2.0, focus: 8.0 });
         let pinhole = camera(Lens::Perspective { fov: 40.0, aperture: 0.0, focus: 8.0 });
         let at_z = |r: Ray, z: f32| r.at((z - r.origin.z) / r.direction.z);

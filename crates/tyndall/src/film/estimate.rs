@@ -1,29 +1,30 @@
-//! What the samples of a pixel add up to: chunks of samples, summed in double precision, that meet in a fixed tree.
+//! Estimates from the samples of a pixel: chunks of samples, summed in double precision, are merged in a fixed tree.
 //!
-//! Chunk `k` holds the samples from `k * CHUNK` on. Chunks 0 to 3 meet in a node, and so on with every four; the nodes of four
-//! such nodes again. The order of all additions follows from the numbers of the samples alone, so that parts of a picture that
-//! were rendered apart add up to the bits of the whole; and no sum ever grows so large that a further sample is lost in it.
+//! Chunk `k` holds the samples from number `k * CHUNK` on. Every four consecutive chunks are merged into a node, every four
+//! consecutive nodes into a node of the next level, and so on. The order of all additions follows from the sample numbers alone,
+//! so that parts of a picture that were rendered separately merge to the bits of the whole; and no sum grows so large that
+//! further samples are lost in rounding.
 
 use super::{PixelSample, luminance_of};
 use crate::math::cast;
 
-/// Samples that are summed one by one.
+/// Samples in a chunk.
 pub(super) const CHUNK: u32 = 16;
 
-/// Chunks, or nodes of the tree, that meet in a node.
+/// Children of a node: chunks, or nodes of the level below.
 pub(super) const FAN_OUT: u32 = 4;
 
-/// Samples below a node of a level; chunks are level 0.
+/// Number of samples in a child of a node of this level; the children of level 0 are chunks.
 pub(super) fn samples_below(level: usize) -> u32 {
     CHUNK * FAN_OUT.pow(cast::fit_u32(level))
 }
 
-/// Sums over the samples of a chunk that is not yet complete.
+/// Sums over the samples of an incomplete chunk.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Sums {
     radiance: [f64; 3],
     squares: [f64; 3],
-    /// Squares of the luminance, which those of the channels do not determine.
+    /// Sum of squared luminances, which cannot be derived from the channels.
     luminance_squares: f64,
     alpha: f64,
     depth: f64,
@@ -50,7 +51,7 @@ impl Sums {
     /// The estimate from these samples, whose number is `count`.
     pub fn estimate(&self, count: u32) -> Estimate {
         let n = f64::from(count);
-        // What rounding leaves of samples that are all alike may be negative.
+        // Rounding may make this negative if all samples are equal.
         let scatter = |squares: f64, sum: f64| cast::single((squares - sum * sum / n).max(0.0));
         let mean = |sum: f64| cast::single(sum / n);
         Estimate {
@@ -63,13 +64,13 @@ impl Sums {
     }
 }
 
-/// The mean of all samples, of which the second mean stands for a share.
+/// The mean of all samples, where `share` is the fraction of them that the second mean represents.
 #[inline(always)]
 pub(super) fn merged_mean(a: f32, b: f32, share: f64) -> f32 {
     cast::single(f64::from(a) + (f64::from(b) - f64::from(a)) * share)
 }
 
-/// Means over samples and the scatter about them.
+/// Means over samples, and sums of squared deviations from them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Estimate {
     pub mean: [f32; 3],
@@ -83,7 +84,7 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
-    /// The estimate from the samples of two, in double precision \[Chan83\]; `n` samples here and `m` there.
+    /// Merges the estimates from `n` samples here and `m` there, in double precision \[Chan83\].
     pub fn merged(&self, n: u32, other: &Self, m: u32) -> Self {
         let (n, m) = (f64::from(n), f64::from(m));
         let share = m / (n + m);

@@ -1,8 +1,8 @@
-//! Looks at an unfinished film: what changed since the last look, tone-mapped for a display.
+//! Views of an unfinished film: what changed since the last look, tone-mapped for a display.
 
+use super::Film;
 use super::tile::{TILE, Tile};
 use super::tone::ToneCurve;
-use super::Film;
 use crate::simd::Level;
 use rayon::prelude::*;
 
@@ -15,22 +15,22 @@ pub struct Tone {
     pub stops: f32,
 }
 
-/// A viewer of a film with a picture of its own, of which each look renews what has changed since.
+/// A viewer of a film, with a picture of its own, of which each look updates the tiles that have changed.
 ///
-/// The picture is opaque RGB, 8 bits for each channel, row by row from the top; a transparent film is seen over black. Where a pixel
-/// has no sample yet it shows the first of its block, and where a tile has none, what it showed before.
+/// The picture is opaque RGB with 8 bits per channel, row by row from the top; a transparent film is shown over black. A pixel
+/// without a sample shows the first pixel of its block; a tile without samples keeps what the viewer showed before.
 #[derive(Clone, Debug, Default)]
 pub struct Viewer {
     size: [u32; 2],
     tone: Tone,
     pixels: Vec<[u8; 3]>,
-    /// Of each tile, by rows.
+    /// The revision of each tile, row by row.
     seen: Vec<Revision>,
-    /// Origins of the tiles that the last look renewed.
+    /// Origins of the tiles that the last look updated.
     changed: Vec<[u32; 2]>,
 }
 
-/// What a tile looked like: no two different contents of it have the same revision.
+/// Identifies the contents of a tile: different contents have different revisions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Revision {
     film: u64,
@@ -50,13 +50,13 @@ impl Viewer {
         self.pixels.as_flattened()
     }
 
-    /// Origins of the tiles, of an edge of [`TILE`] pixels, that the last look renewed.
+    /// Origins of the tiles that the last look updated; their edge is [`TILE`] pixels, or less at the picture's border.
     #[must_use]
     pub fn changed(&self) -> &[[u32; 2]] {
         &self.changed
     }
 
-    /// Renews the picture, in parallel on the current pool.
+    /// Updates the picture, in parallel on the current pool.
     pub fn look(&mut self, film: &Film, tone: Tone, level: Level) {
         if self.size != film.size {
             *self = Self { size: film.size, tone, ..Self::default() };
@@ -71,20 +71,20 @@ impl Viewer {
         let columns = width.div_ceil(TILE as usize);
         let bands = self.pixels.par_chunks_mut(width * TILE as usize);
         let rows = film.tiles.par_chunks(columns).zip(self.seen.par_chunks_mut(columns)).zip(bands);
-        let renewed = rows.flat_map_iter(|((tiles, seen), band)| {
+        let updated = rows.flat_map_iter(|((tiles, seen), band)| {
             let mut row = Row { width, level, tone, band };
             let mut changed = Vec::new();
             for (tile, seen) in tiles.iter().zip(seen) {
                 let revision = Revision { film: film.generation, taken: tile.taken() };
                 if *seen != revision && tile.taken() > 0 {
                     *seen = revision;
-                    row.renew(tile);
+                    row.update(tile);
                     changed.push(tile.origin());
                 }
             }
             changed
         });
-        self.changed = renewed.collect();
+        self.changed = updated.collect();
     }
 }
 
@@ -97,7 +97,7 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    fn renew(&mut self, tile: &Tile) {
+    fn update(&mut self, tile: &Tile) {
         let mut radiance = [[0.0; 3]; (TILE * TILE) as usize];
         let mut codes = [[0; 3]; (TILE * TILE) as usize];
         let [columns, rows] = tile.size().map(|n| n as usize);

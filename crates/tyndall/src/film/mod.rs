@@ -1,7 +1,7 @@
 //! The film: mean and variance of every pixel.
 //!
-//! It is cut into tiles that each thread has for itself, so that pixels next to each other never
-//! share a cache line across threads and each tile may be a sample ahead of another.
+//! The film is divided into tiles, each processed by one thread at a time, so that neighbouring pixels never share a
+//! cache line across threads and a tile may be a sample ahead of another.
 
 mod estimate;
 mod look;
@@ -16,14 +16,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use tile::{Order, PixelEstimate, bytes_of_pixel};
 
-/// What one sample of a pixel found.
+/// The result of one sample of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelSample {
     /// Radiance; premultiplied where the background is transparent.
     pub radiance: Rgb,
     /// 1 - transmittance to the background, or an unbiased estimate of it.
     pub alpha: f32,
-    /// Distance along the view of the matter seen, times `alpha`.
+    /// Distance of the visible matter along the view direction, times `alpha`.
     pub depth: f32,
 }
 
@@ -31,7 +31,7 @@ fn luminance_of([r, g, b]: [f64; 3]) -> f64 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
-/// A picture in the making.
+/// A picture being rendered.
 #[derive(Clone, Debug)]
 pub struct Film {
     /// Tells it from every other film of this process, so that a viewer notices a new one.
@@ -49,12 +49,12 @@ pub struct Image {
     pub rgba: Vec<[f32; 4]>,
     /// Variance of each pixel's mean; infinite with one sample.
     pub variance: Vec<[f32; 3]>,
-    /// Mean distance along the view of the matter seen, world units; infinite where none is.
+    /// Mean distance of the visible matter along the view direction, world units; infinite where there is none.
     pub depth: Vec<f32>,
 }
 
 impl Film {
-    /// Black, without samples. Both sides at least 1.
+    /// Black, without samples. Width and height must be at least 1.
     #[must_use]
     pub fn new(size: [u32; 2]) -> Self {
         let [columns, rows] = size.map(|n| n.div_ceil(TILE));
@@ -70,13 +70,13 @@ impl Film {
         Self { generation, size, tiles: (0..columns * rows).map(tile).collect() }
     }
 
-    /// Tiles of a film of a size.
+    /// Number of tiles of a film of this size.
     #[must_use]
     pub fn tile_count(size: [u32; 2]) -> usize {
         size.map(|n| n.div_ceil(TILE) as usize).iter().product()
     }
 
-    /// Bytes that a film of a size keeps once every pixel has so many samples.
+    /// Bytes that a film of this size occupies once every pixel has this many samples.
     #[must_use]
     pub fn bytes(size: [u32; 2], samples: u32) -> u64 {
         u64::from(size[0]) * u64::from(size[1]) * bytes_of_pixel(samples) as u64
@@ -88,12 +88,12 @@ impl Film {
         self.size
     }
 
-    /// The tiles, to be worked on apart.
+    /// The tiles, which can be processed independently.
     pub fn tiles_mut(&mut self) -> &mut [Tile] {
         &mut self.tiles
     }
 
-    /// Samples that every pixel has at least.
+    /// Minimum number of samples per pixel.
     #[must_use]
     pub fn samples(&self) -> u32 {
         self.tiles.iter().map(Tile::samples).min().unwrap_or(0)
@@ -109,6 +109,13 @@ impl Film {
     pub(crate) fn coarse_goal(&self) -> Option<Goal> {
         let goals = Stride::ALL.map(|stride| Goal { samples: 0, more: Some(stride) });
         goals.into_iter().find(|&goal| !self.has_reached(goal))
+    }
+
+    /// Fraction of the pixels that have a sample.
+    #[must_use]
+    pub fn coverage(&self) -> f64 {
+        let covered: usize = self.tiles.iter().map(Tile::covered).sum();
+        covered as f64 / (f64::from(self.size[0]) * f64::from(self.size[1]))
     }
 
     /// Samples per pixel, averaged over the picture.
@@ -159,8 +166,8 @@ impl Film {
         sum.map(|s| s / (f64::from(self.size[0]) * f64::from(self.size[1])))
     }
 
-    /// Noise of the picture: `sqrt(mean of var / (mean^2 + 0.01 M^2))` in luminance over the pixels,
-    /// `M` the picture's mean. `None` before every pixel has two samples, or if all is black.
+    /// Noise of the picture: `sqrt(mean of var / (mean^2 + 0.01 M^2))` in luminance over the pixels, where `M` is the
+    /// picture's mean. `None` before every pixel has two samples, or if the picture is black.
     #[must_use]
     pub fn relative_error(&self) -> Option<f64> {
         if self.samples() < 2 {
@@ -245,11 +252,11 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_ahead_of_the_others_counts_for_itself() {
+    fn tiles_may_have_different_numbers_of_samples() {
         let mut film = Film::new([32, 16]);
         let grey = |_: [u32; 2], _: u32| PixelSample { radiance: Rgb::WHITE, ..PixelSample::default() };
         add_pass(&mut film.tiles_mut()[1], grey);
-        assert_eq!((film.samples(), film.mean_samples()), (0, 0.5));
+        assert_eq!((film.samples(), film.mean_samples(), film.coverage()), (0, 0.5, 0.5));
         assert_eq!(film.relative_error(), None);
         for _ in 0..2 {
             film.tiles_mut().iter_mut().for_each(|t| add_pass(t, grey));
@@ -339,7 +346,8 @@ mod tests {
     #[test]
     fn a_look_renews_what_changed_and_a_missing_pixel_shows_its_blocks_first() {
         let (tone, level) = (Tone { curve: tone::ToneCurve::Linear, stops: 0.0 }, Level::best());
-        let grey = |x: u8| PixelSample { radiance: Rgb::splat(f32::from(x) / 40.0), ..PixelSample::default() };
+        let grey =
+            |x: u8| PixelSample { radiance: Rgb::splat(f32::from(x) / 40.0), ..PixelSample::default() };
         let mut film = Film::new([32, 20]);
         let mut viewer = Viewer::default();
         viewer.look(&film, tone, level);
@@ -375,7 +383,7 @@ mod tests {
 
     #[test]
     fn the_error_is_that_of_the_mean() {
-        // Samples 0 and 2 by turns: variance 1, mean 1, n = 400.
+        // Alternating samples 0 and 2: variance 1, mean 1, n = 400.
         let mut film = Film::new([16, 16]);
         for _ in 0..400 {
             add_pass(&mut film.tiles_mut()[0], |_, n| PixelSample {

@@ -1,4 +1,4 @@
-//! A tile: the unit of work, with all that its pixels' samples add up to.
+//! A tile: the unit of work, with the estimates of its pixels.
 
 use super::PixelSample;
 use super::estimate::{CHUNK, Estimate, FAN_OUT, Sums, merged_mean, samples_below};
@@ -11,7 +11,7 @@ pub const TILE: u32 = 16;
 /// Edge of the blocks in which a tile's pixels are ordered.
 const BLOCK: u32 = 4;
 
-/// Pixels that are spread evenly over the film: those whose coordinates are multiples of 8, 4 or 2.
+/// Pixels spread evenly over the film: those whose coordinates are multiples of 8, 4 or 2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stride {
     /// One pixel of 64.
@@ -26,14 +26,14 @@ impl Stride {
     /// From the coarsest.
     pub const ALL: [Self; 3] = [Self::Eight, Self::Four, Self::Two];
 
-    /// Distance between its pixels along rows and columns.
+    /// Distance between the pixels along rows and columns.
     #[must_use]
     pub fn pixels(self) -> u32 {
         8 >> self as u32
     }
 }
 
-/// How far a film is to come.
+/// How many samples a film is to have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Goal {
     /// Samples in every pixel.
@@ -43,13 +43,13 @@ pub struct Goal {
 }
 
 impl Goal {
-    /// So many samples in every pixel.
+    /// This many samples in every pixel.
     #[must_use]
     pub fn samples(samples: u32) -> Self {
         Self { samples, more: None }
     }
 
-    /// Whether it includes all of another goal, and more.
+    /// Whether it includes more samples than another goal.
     #[must_use]
     pub(crate) fn is_beyond(self, other: Self) -> bool {
         let rank = |goal: Self| (goal.samples, goal.more.map_or(0, |stride| 1 + stride as u32));
@@ -58,20 +58,20 @@ impl Goal {
 }
 
 /// The order in which the pixels of a tile take their samples: from the coarsest stride to the finest, so that an unfinished pass
-/// shows the whole picture; block by block of 4 x 4 within each, so that pixels that follow each other are near.
+/// covers the whole picture, and in blocks of 4 x 4 within each stride, so that consecutive pixels are close together.
 #[derive(Debug)]
 pub(super) struct Order {
     /// Positions in the tile.
     positions: Vec<[u32; 2]>,
     size: [u32; 2],
-    /// The number in this order of each pixel, row by row.
+    /// The index in this order of each pixel, row by row.
     numbers: Vec<u8>,
-    /// The number of pixels of each stride, those of coarser ones included.
+    /// For each stride, the number of its pixels.
     within: [usize; 3],
 }
 
 impl Order {
-    /// Of a tile of a size, whose origin in the film is a multiple of [`TILE`].
+    /// For a tile of this size, whose origin in the film is a multiple of [`TILE`].
     pub fn new(size: [u32; 2]) -> Self {
         let [width, height] = size;
         let mut positions: Vec<_> = (0..width * height).map(|i| [i % width, i / width]).collect();
@@ -95,14 +95,14 @@ pub struct Tile {
     samples: u32,
     /// Pixels that have one sample more.
     ahead: usize,
-    /// The chunk that each pixel is at.
+    /// The incomplete chunk of each pixel.
     open: Vec<Sums>,
-    /// For each level of the tree and each pixel, the nodes of this level that have not yet met in one of the next. How many they
-    /// are follows from the number of samples, so that what is left of older ones does no harm.
+    /// For each level of the tree and each pixel, the merged children of the node that is incomplete. Their number follows from
+    /// the number of samples; where it is zero, the entry is out of date.
     nodes: Vec<Vec<Estimate>>,
 }
 
-/// Bytes that a pixel takes once it has so many samples: 72, and 36 for each level of the tree that they reach.
+/// Bytes per pixel once it has this many samples: 72, and 36 for each level of the tree that they reach.
 pub(super) fn bytes_of_pixel(samples: u32) -> usize {
     let levels = (0..16).take_while(|&level| samples >= samples_below(level)).count();
     size_of::<Sums>() + levels * size_of::<Estimate>()
@@ -133,33 +133,38 @@ impl Tile {
         self.samples as usize * self.pixel_count() + self.ahead
     }
 
-    /// Samples that its pixels have taken, all together, once it has come as far as a goal.
+    /// Number of samples that its pixels have taken in total once it has reached a goal.
     fn taken_at(&self, Goal { samples, more }: Goal) -> usize {
         let more = more.map_or(0, |stride| self.order.within[stride as usize]);
         samples as usize * self.pixel_count() + more
     }
 
-    /// Whether it has come as far as a goal.
+    /// Number of pixels that have a sample.
+    pub(super) fn covered(&self) -> usize {
+        if self.samples > 0 { self.pixel_count() } else { self.ahead }
+    }
+
+    /// Whether it has reached a goal.
     #[must_use]
     pub fn has_reached(&self, goal: Goal) -> bool {
         self.taken() >= self.taken_at(goal)
     }
 
-    /// The pixels that are next to take a sample on the way to a goal, by their number in the order of the tile; all take the
-    /// same sample.
+    /// The pixels that are next to take a sample towards a goal, as indices in the tile's order; all take sample number
+    /// [`Self::samples`].
     #[must_use]
     pub fn turn(&self, goal: Goal) -> Range<usize> {
         let due = self.taken_at(goal).saturating_sub(self.taken());
         self.ahead..(self.ahead + due).min(self.pixel_count())
     }
 
-    /// The first of these, at most `most`, by their position in the film.
+    /// Positions in the film of at most `most` of these.
     pub fn next(&self, goal: Goal, most: usize) -> impl ExactSizeIterator<Item = [u32; 2]> {
         let turn = self.turn(goal);
         self.positions(turn.start..turn.end.min(turn.start + most))
     }
 
-    /// The positions in the film of pixels, by their numbers in the order of the tile.
+    /// Positions in the film of pixels, given by their indices in the tile's order.
     pub fn positions(&self, pixels: Range<usize>) -> impl ExactSizeIterator<Item = [u32; 2]> {
         self.order.positions[pixels].iter().map(|&position| self.in_film(position))
     }
@@ -193,7 +198,7 @@ impl Tile {
         }
     }
 
-    /// Moves a pixel's complete chunk into the tree, and each node that this completes.
+    /// Merges a pixel's complete chunk into the tree, and each node that this completes.
     fn close_chunk(&mut self, pixel: usize, chunk: u32) {
         let mut node = std::mem::take(&mut self.open[pixel]).estimate(CHUNK);
         let mut number = chunk;
@@ -219,7 +224,7 @@ impl Tile {
         self.samples + u32::from(i < self.ahead)
     }
 
-    /// What the samples of the `i`-th pixel add up to, from the largest node to the open chunk.
+    /// The estimate from all samples of the `i`-th pixel, merged from the largest node to the incomplete chunk.
     fn estimate(&self, i: usize) -> Estimate {
         let samples = self.samples_of(i);
         let (mut whole, mut n) = (Estimate::default(), 0);
@@ -240,8 +245,8 @@ impl Tile {
         whole
     }
 
-    /// The radiance of each pixel, row by row; that of the first pixel of its block where a pixel has no sample. At least the tile's
-    /// first pixel has one.
+    /// The radiance of each pixel, row by row; where a pixel has no sample, that of the first pixel of its block. At least the
+    /// tile's first pixel must have a sample.
     pub(super) fn look(&self, radiance: &mut [[f32; 3]]) {
         let means = [self.samples, self.samples + 1].map(|samples| Means::new(samples, self.nodes.len()));
         let width = self.order.size[0];
@@ -267,11 +272,11 @@ impl Tile {
     }
 }
 
-/// How the parts of pixels with the same number of samples meet: see [`Tile::estimate`], whose mean this is.
+/// How to merge the mean radiance of pixels with a given number of samples: gives the same bits as [`Tile::estimate`].
 struct Means {
-    /// Levels from which a node comes, with the share of the samples so far that it stands for.
+    /// Levels to merge, each with its share of the samples merged so far.
     nodes: Vec<(usize, f64)>,
-    /// Samples of the open chunk, and their share.
+    /// Samples of the incomplete chunk, and their share.
     open: (u32, f64),
 }
 
@@ -293,7 +298,7 @@ impl Means {
     fn radiance(&self, tile: &Tile, pixel: usize) -> [f32; 3] {
         let mut mean = [0.0; 3];
         let mut add = |part: [f32; 3], share: f64| {
-            // The first part is all there is.
+            // The first part is exact.
             mean = if share == 1.0 {
                 part
             } else {
@@ -311,7 +316,7 @@ impl Means {
     }
 }
 
-/// What is known of a pixel.
+/// The state of a pixel.
 pub(super) struct PixelEstimate {
     pub position: [u32; 2],
     pub samples: f64,

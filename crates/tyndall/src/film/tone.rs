@@ -1,6 +1,6 @@
 //! Tone mapping: from scene-linear radiance to the code values of an sRGB display.
 //!
-//! A curve only shows a picture; the record of the light is the linear one.
+//! A curve is for display only; the film records linear radiance.
 
 use crate::math::Rgb;
 use crate::simd::{Kernel, Lanes, Level, exp2_unfused, log2_unfused};
@@ -12,7 +12,7 @@ const RED: f32 = 0.2126;
 const GREEN: f32 = 0.7152;
 const BLUE: f32 = 0.0722;
 
-/// How radiance without an upper bound is brought into the range of a display.
+/// How unbounded radiance is compressed into the range of a display.
 ///
 /// Every curve takes linear Rec. 709 primaries and yields sRGB code values in [0, 1].
 #[derive(
@@ -20,10 +20,10 @@ const BLUE: f32 = 0.0722;
 )]
 #[serde(rename_all = "lowercase")]
 pub enum ToneCurve {
-    /// `AgX`, the base look, with highlights that lose their colour as film does \[Sobotka22, Wrensch23\].
+    /// `AgX`, the base look: highlights desaturate as on film \[Sobotka22, Wrensch23\].
     #[default]
     Agx,
-    /// None: clipped at 1, then encoded as IEC 61966-2-1 says.
+    /// None: clipped at 1, then encoded according to IEC 61966-2-1.
     Linear,
     /// Luminance `L` becomes `L / (1 + L)` \[Reinhard02, eq. 3\]; saturated channels clip.
     Reinhard,
@@ -43,7 +43,7 @@ impl ToneCurve {
         Rgb::from(codes[0])
     }
 
-    /// The same for many pixels, as the nearest of 256 levels. Every vector level gives the same bytes.
+    /// The same for many pixels, as the nearest of 256 code values. Every vector level gives the same bytes.
     ///
     /// # Panics
     /// If there are not as many `codes` as `pixels`.
@@ -53,9 +53,9 @@ impl ToneCurve {
     }
 }
 
-/// How a code value is kept.
+/// The type of a code value.
 trait Code: Copy {
-    /// From a value in [0, 1], and its number among 256 levels.
+    /// From a value in [0, 1], and the same as one of 256 levels.
     fn new(value: f32, level: i32) -> Self;
 }
 
@@ -88,7 +88,7 @@ impl<C: Code> Kernel for Encode<'_, C> {
     fn run<S: Lanes>(self, simd: S) {
         let Self { curve, gain, pixels, codes } = self;
         for (pixels, codes) in pixels.chunks(S::WIDTH).zip(codes.chunks_mut(S::WIDTH)) {
-            // Past the last pixel lanes repeat it.
+            // Lanes beyond the last pixel repeat it.
             let scene = [0, 1, 2].map(|channel| {
                 let of = |lane: usize| pixels[lane.min(pixels.len() - 1)][channel];
                 clip(simd, S::f32s::from_fn(simd, of) * gain, BRIGHTEST)
@@ -113,37 +113,37 @@ impl<C: Code> Kernel for Encode<'_, C> {
     }
 }
 
-/// The sRGB code value of a linear one [IEC 61966-2-1]; what lies outside [0, 1] is clipped, NaN is 0.
+/// The sRGB code value of a linear one [IEC 61966-2-1]; values outside [0, 1] are clipped, NaN becomes 0.
 #[must_use]
 pub fn encode_srgb(linear: f32) -> f32 {
     let x = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// The nearest of the 256 levels of [0, 1]; what lies outside is clipped, NaN is 0.
+/// The nearest of the 256 levels of [0, 1]; values outside are clipped, NaN becomes 0.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` saturates, NaN becomes 0")]
 pub fn quantize(x: f32) -> u8 {
     (x * 255.0).round() as u8
 }
 
-/// The brightest scene value that a curve sees: all are flat far below it, and its square is finite.
+/// Scene values are clipped to this before a curve: all curves are flat far below it, and its square is finite.
 const BRIGHTEST: f32 = 1e10;
 
-/// To [0, high]; NaN becomes 0.
+/// Clamps to [0, high]; NaN becomes 0.
 #[inline(always)]
 fn clip<S: Lanes>(simd: S, x: S::f32s, high: f32) -> S::f32s {
     let zero = S::f32s::splat(simd, 0.0);
     x.simd_gt(zero).select(x.min(high), zero)
 }
 
-/// [`encode_srgb`]: the root is taken by logarithm.
+/// [`encode_srgb`] in lanes; the root is computed from logarithms.
 #[inline(always)]
 fn encode_lanes<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
     let x = clip(simd, x, 1.0);
     let root = exp2_unfused(simd, log2_unfused(simd, x.max(f32::MIN_POSITIVE)) * (1.0 / 2.4));
     let linear = S::f32s::splat(simd, 0.003_130_8);
-    // Rounding must not lead past 1.
+    // Rounding may exceed 1.
     x.simd_le(linear).select(x * 12.92, root * 1.055 - 0.055).min(1.0)
 }
 
@@ -157,7 +157,7 @@ fn aces<V: Copy + Mul<f32, Output = V> + Mul<V, Output = V> + Add<f32, Output = 
 
 type Matrix = [[f32; 3]; 3];
 
-/// Scene stops that `AgX` spans, as log2 of the linear value \[Sobotka22\].
+/// Range of scene values that `AgX` covers, as log2 of the linear value \[Sobotka22\].
 const AGX_STOPS: [f32; 2] = [-12.473_93, 4.026_069];
 
 /// Moves pure colours towards white, so that bright ones desaturate instead of clipping \[Wrensch23\].
@@ -167,14 +167,14 @@ const AGX_INSET: Matrix = rows_to_one([
     [0.042_375_655, 0.078_433_6, 0.879_143],
 ]);
 
-/// The way back, after the contrast curve \[Wrensch23\].
+/// The inverse matrix, applied after the contrast curve \[Wrensch23\].
 const AGX_OUTSET: Matrix = rows_to_one([
     [1.196_879, -0.098_020_88, -0.099_029_74],
     [-0.052_896_85, 1.151_903_1, -0.098_961_18],
     [-0.052_971_635, -0.098_043_45, 1.151_073_7],
 ]);
 
-/// The published rows miss a sum of one by up to 2e-4; with it, grey stays grey.
+/// Normalizes the rows: the sums of the published ones differ from 1 by up to 2e-4, and grey must stay grey.
 const fn rows_to_one(rows: Matrix) -> Matrix {
     let mut result = rows;
     let mut i = 0;
@@ -186,7 +186,7 @@ const fn rows_to_one(rows: Matrix) -> Matrix {
     result
 }
 
-/// \[Wrensch23\]'s fit of the base look of \[Sobotka22\]; the curve's output is meant for the display as it is.
+/// \[Wrensch23\]'s fit of the base look of \[Sobotka22\]; the output is already encoded for the display.
 #[inline(always)]
 fn agx<S: Lanes>(simd: S, scene: [S::f32s; 3]) -> [S::f32s; 3] {
     let [low, high] = AGX_STOPS;
@@ -289,11 +289,12 @@ mod tests {
         }
     }
 
-    /// One rounding of the `AgX` polynomial, whose coefficients add up to 95; the published rows miss grey by 7e-5.
+    /// A rounding error of the `AgX` polynomial, whose coefficients add up to 95; the published rows are off grey by
+    /// 7e-5.
     const ROUNDING: f32 = 95.0 * f32::EPSILON;
 
     #[test]
-    fn grey_stays_grey_and_grows() {
+    fn grey_stays_grey_and_monotonic() {
         for curve in CURVES {
             let mut last = 0.0;
             for step in -400_i16..400 {

@@ -1,4 +1,4 @@
-//! A running method, whichever it is: what a session drives.
+//! The type-erased interface of a running method, which a session drives.
 
 use super::Limits;
 use super::method::{
@@ -15,7 +15,7 @@ use serde_json::Value;
 pub(crate) trait Engine: Send + Sync {
     /// See [`Method::is_touched_by`].
     fn is_touched_by(&self, difference: &Difference) -> bool;
-    /// See [`Method::update`]; the film has so many tiles now.
+    /// See [`Method::update`]; `tiles` is the film's new number of tiles.
     fn update(&mut self, edit: &Edited, tiles: usize) -> bool;
     /// See [`Method::count_anew`].
     fn count_anew(&mut self);
@@ -23,7 +23,7 @@ pub(crate) trait Engine: Send + Sync {
     fn prepare(&mut self, scene: &Scene, sample: u32, limits: &Limits) -> bool;
     /// See [`Method::samples_at_once`].
     fn samples_at_once(&self) -> u32;
-    /// See [`Method::refine`]: all tiles, in parallel on the current pool.
+    /// See [`Method::refine`]; refines all tiles, in parallel on the current pool.
     fn refine(&mut self, scene: &Scene, tiles: &mut [Tile], goal: Goal, limits: &Limits);
     /// See [`Method::report`].
     fn report(&self, pixels: &PixelCounts) -> MethodReport;
@@ -33,7 +33,7 @@ pub(crate) trait Engine: Send + Sync {
     fn has_noise(&self) -> bool;
 }
 
-/// A method with the states of a film's tiles.
+/// A method with its states of the film's tiles.
 struct Driver<M: Method> {
     method: M,
     tiles: Vec<M::TileState>,
@@ -84,7 +84,7 @@ impl<M: Method> Engine for Driver<M> {
     }
 }
 
-/// An entry in the list of methods: what can be asked of a method before it runs.
+/// An entry in the list of methods: what is known about a method before it runs.
 #[derive(Debug)]
 pub struct MethodEntry {
     /// See [`Method::NAME`].
@@ -107,7 +107,7 @@ pub struct MethodEntry {
 }
 
 impl MethodEntry {
-    /// The entry of a method.
+    /// The entry for a method.
     #[must_use]
     pub const fn of<M: Method>() -> Self {
         Self {
@@ -133,7 +133,7 @@ impl MethodEntry {
         self.name.replace('-', "_")
     }
 
-    /// The method with the settings of a document that names none.
+    /// The method with the settings that apply if the document gives none.
     #[must_use]
     pub fn default_settings(&self) -> MethodChoice {
         (self.default_settings)()
@@ -148,12 +148,12 @@ impl MethodEntry {
     /// The method with settings from a document.
     ///
     /// # Errors
-    /// If the value is not what the schema describes.
+    /// If the value does not match the schema.
     pub fn read(&self, settings: Value) -> Result<MethodChoice, serde_json::Error> {
         (self.read)(settings)
     }
 
-    /// Its settings as a value; `None` if they are another method's.
+    /// Its settings as a JSON value; `None` if `choice` is of another method.
     #[must_use]
     pub fn write(&self, choice: &MethodChoice) -> Option<Value> {
         (self.write)(choice)
@@ -168,7 +168,7 @@ impl MethodEntry {
     /// See [`Method::check`].
     ///
     /// # Errors
-    /// [`SettingProblem`] for the first setting that cannot be.
+    /// [`SettingProblem`] for the first invalid setting.
     pub fn check(&self, choice: &MethodChoice) -> Result<(), SettingProblem> {
         (self.check)(choice)
     }
@@ -185,7 +185,7 @@ impl MethodEntry {
         (self.memory)(scene)
     }
 
-    /// Starts the method on a scene, with nothing computed yet.
+    /// Creates the method for a scene, with nothing computed yet.
     pub(crate) fn start(&self, scene: &Scene, resources: &Resources) -> Box<dyn Engine> {
         (self.start)(scene, resources)
     }
@@ -195,7 +195,7 @@ fn chosen<M: Method>(choice: &MethodChoice) -> Option<&M::Settings> {
     choice.settings::<Chosen<M>>().map(|chosen| &chosen.0)
 }
 
-/// A scene's settings; the defaults where it asks for another method.
+/// A scene's settings; the defaults if it selects another method.
 fn settings_of<M: Method>(scene: &Scene) -> M::Settings {
     chosen::<M>(&scene.render.method).cloned().unwrap_or_default()
 }
@@ -204,7 +204,7 @@ fn notes<M: Method>(scene: &Scene) -> Vec<&'static str> {
     let mut notes = M::notes(&settings_of::<M>(scene), scene);
     let bends = scene.medium.transfer().points().iter().any(|p| p.optics.ior != 1.0);
     if bends && !M::BENDS_LIGHT {
-        notes.push("the refractive index is ignored: light goes straight");
+        notes.push("the refractive index is ignored: light travels in straight lines");
     }
     notes
 }

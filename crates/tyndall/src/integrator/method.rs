@@ -1,4 +1,4 @@
-//! What a method of computing light is to everything outside its folder.
+//! The interface of a rendering method to everything outside its folder.
 
 use super::{Limits, Stop};
 use crate::film::{Goal, Tile};
@@ -10,28 +10,28 @@ use serde::de::DeserializeOwned;
 use std::any::Any;
 use std::fmt::Debug;
 
-/// A method of computing light: its name and settings, and its state while it works on a scene.
+/// A rendering method: its name and settings, and its state while it renders a scene.
 ///
-/// Everything about a sample follows from the scene, its pixel and its number, so that neither threads nor the slices of time
-/// in which a session works leave a trace in the picture. All functions here are called once for a pass or a tile, never once
-/// for a sample. Those that run for long may use the current thread pool.
+/// A sample is fully determined by the scene, its pixel and its number, so that the picture depends neither on threads
+/// nor on the time slices in which a session works. All functions here are called once per pass or tile, never once per
+/// sample. Long-running ones may use the current thread pool.
 pub trait Method: Sized + Send + Sync + 'static {
     /// Name in the scene document and on the command line: lower-case words joined by hyphens.
     const NAME: &'static str;
 
-    /// What it is, in a sentence for lists and for the document's schema.
+    /// A one-sentence description, for lists and for the document's schema.
     const ABOUT: &'static str;
 
-    /// Whether samples of a pixel are random, so that the picture has an error estimate.
+    /// Whether samples are random, so that the picture has a noise estimate.
     const HAS_NOISE: bool = true;
 
-    /// Whether light bends where the refractive index changes; else a scene with an index is told that it is ignored.
+    /// Whether light bends where the refractive index changes; if not, a note says that a scene's index is ignored.
     const BENDS_LIGHT: bool = false;
 
-    /// Keys of its table in the document that now stand elsewhere.
+    /// Keys of its table that have moved elsewhere in the document.
     const MOVED_KEYS: &'static [MovedKey] = &[];
 
-    /// Its settings; `Default` gives those of a document that names none.
+    /// Its settings; `Default` gives those that apply if the document gives none.
     type Settings: Clone
         + Debug
         + Default
@@ -43,95 +43,95 @@ pub trait Method: Sized + Send + Sync + 'static {
         + Sync
         + 'static;
 
-    /// State kept for each tile beside its pixels; the default is that of a tile not yet begun.
+    /// State kept for each tile besides its pixels; the default is that of a tile not yet started.
     type TileState: Default + Send + Sync + 'static;
 
     /// Checks what a JSON Schema cannot express.
     ///
     /// # Errors
-    /// [`SettingProblem`] for the first setting that cannot be.
+    /// [`SettingProblem`] for the first invalid setting.
     fn check(settings: &Self::Settings) -> Result<(), SettingProblem> {
         let _ = settings;
         Ok(())
     }
 
-    /// Settings that mean the same but ask for little work: for thumbnails and tests.
+    /// Settings for a similar picture with little work: for thumbnails and tests.
     #[must_use]
     fn draft(settings: &Self::Settings) -> Self::Settings {
         settings.clone()
     }
 
-    /// What the method leaves out of this scene, or does differently from what a user may expect; one sentence each.
+    /// What the method leaves out in this scene, or does differently from what a user may expect; one sentence each.
     fn notes(settings: &Self::Settings, scene: &Scene) -> Vec<&'static str> {
         let _ = (settings, scene);
         Vec::new()
     }
 
-    /// The most memory that it may need for a scene beyond film and medium; `None` if that is negligible.
+    /// Most memory that it may need for a scene besides film and medium; `None` if that is negligible.
     fn memory(settings: &Self::Settings, scene: &Scene) -> Option<MemoryNeed> {
         let _ = (settings, scene);
         None
     }
 
-    /// Prepares the method for a scene, without any long computation.
+    /// Creates the method for a scene, without any long computation.
     fn new(scene: &Scene, settings: &Self::Settings, resources: &Resources) -> Self;
 
-    /// Whether samples taken before an edit may differ, by a bit or more, from those that would be taken now.
+    /// Whether samples taken before an edit may differ, even by one bit, from those that would be taken now.
     fn is_touched_by(&self, difference: &Difference) -> bool;
 
-    /// Goes on from one scene to another that touches it, and keeps what of its own state and of the tiles' is still valid;
-    /// false where that is nothing, and the method is to begin anew. Called for edits that leave its settings alone.
+    /// Updates to an edited scene, for an edit that touches the method but not its settings. Keeps what is still valid
+    /// of its own state and of the tiles'; false if nothing is, and the method must be created again.
     fn update(&mut self, edit: &Edited, tiles: &mut [Self::TileState]) -> bool {
         let _ = (edit, tiles);
         false
     }
 
-    /// Begins to count anew what is computed, after an edit that did not touch the method.
+    /// Resets the counts of what was computed, after an edit that did not touch the method.
     fn count_anew(&mut self, tiles: &mut [Self::TileState]) {
         let _ = tiles;
     }
 
-    /// Prepares what sample number `sample` of all pixels needs; false if a stop came first.
+    /// Prepares what sample number `sample` of all pixels needs; false if it was stopped first.
     fn prepare(&mut self, scene: &Scene, sample: u32, limits: &Limits) -> bool {
         let _ = (scene, sample, limits);
         true
     }
 
-    /// Samples that may follow each other without being prepared one by one.
+    /// Number of consecutive samples that need only one call of [`Self::prepare`].
     fn samples_at_once(&self) -> u32 {
         u32::MAX
     }
 
-    /// Adds samples to the pixels of a tile until it has come as far as `goal`, or is told to stop. What is then half done
-    /// waits in `state` and is taken up by the next call, so that slices of any length get on.
+    /// Adds samples to the pixels of a tile until it reaches `goal`, or until `stop`. Unfinished work is kept in `state` and
+    /// continued by the next call, so that time slices of any length make progress.
     fn refine(&self, scene: &Scene, tile: &mut Tile, state: &mut Self::TileState, goal: Goal, stop: &Stop);
 
-    /// What was computed and is kept; `pixels` tells how many samples the film has taken.
+    /// What was computed and is kept; `pixels` gives the number of samples that the film has taken.
     fn report(&self, tiles: &[Self::TileState], pixels: &PixelCounts) -> MethodReport {
         let _ = tiles;
         MethodReport::of_pixels(pixels, 0)
     }
 
-    /// A copy of what it keeps through edits beside pixels, for checks; `None` where that is nothing.
+    /// A copy of what it keeps across edits besides pixels, for tests; `None` if it keeps nothing.
     fn kept_items(&self, tiles: &[Self::TileState]) -> Option<Box<dyn KeptItems>> {
         let _ = tiles;
         None
     }
 
-    /// The method with its default settings, as a scene asks for it.
+    /// The method with its default settings, in the form that a scene holds.
     #[must_use]
     fn usual() -> MethodChoice {
         Self::choose(Self::Settings::default())
     }
 
-    /// The method with these settings, as a scene asks for it.
+    /// The method with these settings, in the form that a scene holds.
     #[must_use]
     fn choose(settings: Self::Settings) -> MethodChoice {
         MethodChoice::new(Chosen::<Self>(settings))
     }
 }
 
-/// A method's settings, which tell whose they are.
+/// A method's settings, with the method as their type parameter.
 pub(super) struct Chosen<M: Method>(pub M::Settings);
 
 impl<M: Method> Debug for Chosen<M> {
@@ -151,12 +151,12 @@ impl<M: Method> MethodSettings for Chosen<M> {
     }
 }
 
-/// What a method may use.
+/// Resources that a method may use.
 #[derive(Clone, Copy, Debug)]
 pub struct Resources {
     /// Vector instructions.
     pub level: Level,
-    /// Bytes that it may use, within its settings, for what only future edits need; 0 if there will be none.
+    /// Bytes that it may use, within its settings, for data that only future edits need; 0 if there will be no edits.
     pub edit_memory: usize,
 }
 
@@ -171,19 +171,19 @@ pub struct Edited<'a> {
     pub difference: &'a Difference,
 }
 
-/// A key of a method's table that now stands elsewhere in the document.
+/// A key of a method's table that has moved elsewhere in the document.
 #[derive(Clone, Copy, Debug)]
 pub struct MovedKey {
     /// The key in the method's table.
     pub key: &'static str,
-    /// Where it stands now, with dots between its parts.
+    /// Its new place in the document, as a dotted path.
     pub now: &'static str,
 }
 
 /// What is wrong with a setting.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SettingProblem {
-    /// Its key.
+    /// The setting's key.
     pub key: &'static str,
     /// What was found.
     pub found: String,
@@ -194,86 +194,86 @@ pub struct SettingProblem {
 /// Memory that a method may need.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryNeed {
-    /// Most bytes to be expected; random path lengths may exceed it slightly.
+    /// Expected maximum in bytes; random path lengths may exceed it slightly.
     pub bytes: u64,
     /// The setting that it depends on most.
     pub key: &'static str,
-    /// For what, in the plural: "5 light paths".
+    /// What the memory is for, in the plural: "5 light paths".
     pub what: String,
-    /// What would take less.
-    pub mend: &'static str,
+    /// What would need less memory.
+    pub fix: &'static str,
 }
 
 /// Samples that a film has taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelCounts {
-    /// Pixels.
+    /// Number of pixels.
     pub pixels: usize,
     /// Samples per pixel, on average.
     pub samples: f64,
-    /// Samples per pixel, on average, that the last edit left.
+    /// Mean number of samples per pixel that the last edit left in the film.
     pub left: f64,
 }
 
-/// What a method has computed since the last edit, or since the beginning, and what it keeps for edits to come.
+/// What a method has computed since the last edit, or since the beginning, and what it keeps for future edits.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct MethodReport {
-    /// Of each kind of work item, such as pixels or view-ray segments, the share that was computed.
+    /// For each kind of work item, such as pixels or view-ray segments, the share that was computed.
     pub recomputed: Vec<WorkShare>,
-    /// What is kept through edits beside pixels.
+    /// What is kept across edits besides pixels.
     pub kept: Vec<KeptCount>,
-    /// Of what is kept through edits beside pixels, the items that were computed; `None` where nothing is kept.
+    /// Of the items kept across edits besides pixels, the number that were computed; `None` if nothing is kept.
     pub items_computed: Option<usize>,
-    /// Further counts that benches ask for.
+    /// Further counts, for benchmarks.
     pub counts: Vec<NamedCount>,
-    /// Names of the two stages that time is spent on: before samples are taken, and while they are.
+    /// Names of the two timed stages: preparation and sampling.
     pub stages: StageNames,
 }
 
 /// The share of a kind of work item that was computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorkShare {
-    /// What kind.
+    /// Name of the kind.
     pub name: &'static str,
     /// 0 to 1.
     pub share: f64,
 }
 
 impl WorkShare {
-    /// So many of all; none of none is nothing.
+    /// The share `computed` of `all`; 0 if both are 0.
     #[must_use]
     pub fn new(name: &'static str, computed: usize, all: usize) -> Self {
         Self { name, share: computed as f64 / all.max(1) as f64 }
     }
 }
 
-/// How many items of a kind are kept.
+/// Number of kept items of a kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KeptCount {
-    /// What kind.
+    /// Name of the kind.
     pub name: &'static str,
-    /// How many.
+    /// Number of items.
     pub count: usize,
-    /// What they take together.
+    /// Their total size in bytes.
     pub bytes: usize,
 }
 
 /// A count with a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NamedCount {
-    /// Of what.
+    /// What is counted.
     pub name: &'static str,
-    /// How many.
+    /// The count.
     pub count: usize,
 }
 
 /// Names of the two stages of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StageNames {
-    /// What is made before samples are taken; `None` where that is nothing.
+    /// What is prepared before samples are taken; `None` if nothing is.
     pub preparation: Option<&'static str>,
-    /// What samples are taken of.
+    /// What sampling computes.
     pub sampling: &'static str,
 }
 
@@ -283,11 +283,11 @@ impl Default for StageNames {
     }
 }
 
-/// The work items that every method has.
+/// Name of the work items that every method has.
 const PIXELS: &str = "pixels";
 
 impl MethodReport {
-    /// Of a method that computes samples of pixels, of which so many were `found` among those that it keeps.
+    /// The report of a method that computes pixel samples; `found` is the number that it reused from those it keeps.
     #[must_use]
     pub fn of_pixels(pixels: &PixelCounts, found: usize) -> Self {
         let taken = pixels.samples - pixels.left - found as f64 / pixels.pixels as f64;
@@ -296,18 +296,18 @@ impl MethodReport {
     }
 }
 
-/// What a method kept through edits at one time.
+/// What a method keeps across edits, at one point in time.
 pub trait KeptItems: Any + Send + Sync {
-    /// Holds them against what was kept at another time, or by another session.
+    /// Compares with what was kept at another time, or by another session.
     fn compare(&self, other: &dyn KeptItems) -> ItemChanges;
 }
 
-/// How what was kept at one time differs from what was kept at another.
+/// Differences between what was kept at two points in time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ItemChanges {
-    /// Items that were kept at both times, and differ.
+    /// Items that were kept at both times but differ.
     pub differing: usize,
-    /// Items that were kept at the first time alone.
+    /// Items that were kept only at the first time.
     pub new: usize,
 }
 

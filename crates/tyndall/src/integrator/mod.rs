@@ -1,7 +1,7 @@
-//! The methods of computing light, a folder each, and the one interface by which everything else meets them.
+//! The rendering methods, each in its folder, and the one interface through which everything else uses them.
 //!
-//! A new method is a folder with a type that implements [`Method`], and a line in each of the two lists here. Command line, scene
-//! document, sessions, tests and continuous integration go over [`METHODS`].
+//! A new method is a folder with a type that implements [`Method`], and a line in each of the two lists here. The
+//! command line, scene document, sessions, tests and continuous integration iterate over [`METHODS`].
 
 mod cells;
 mod engine;
@@ -38,19 +38,19 @@ pub static METHODS: &[MethodEntry] = &[
     MethodEntry::of::<plain::Plain>(),
 ];
 
-/// The method of a scene that names none: unbiased, the truth that others are held against.
+/// The method of a scene that names none: unbiased, the reference for the others.
 pub static DEFAULT_METHOD: MethodEntry = MethodEntry::of::<path::PathTracer>();
 
-/// The method of a name.
+/// The method with this name.
 #[must_use]
 pub fn method_named(name: &str) -> Option<&'static MethodEntry> {
     METHODS.iter().find(|method| method.name == name)
 }
 
-/// The method that a scene asks for.
+/// The method that a scene selects.
 ///
 /// # Panics
-/// If the choice is of a method that is not in the list.
+/// If the method is not in the list.
 #[must_use]
 pub fn method_of(choice: &MethodChoice) -> &'static MethodEntry {
     method_named(choice.name()).unwrap_or_else(|| panic!("method `{}` is not in the list", choice.name()))

@@ -1,4 +1,4 @@
-//! Next-event estimation: light that reaches a scattering position without scattering on its way.
+//! Next-event estimation: light that reaches a scattering position without scattering on the way.
 
 use crate::light::LightSample;
 use crate::math::{Ray, Rgb, Vec3};
@@ -18,8 +18,8 @@ pub(crate) struct ScatteringPoint<'a> {
 }
 
 impl ScatteringPoint<'_> {
-    /// What one light, chosen by power, sends to the point and on to the viewer, weighted by the balance heuristic \[Veach97\]
-    /// against finding the light by the scattered direction.
+    /// Light from one source, chosen by power, that the point scatters to the viewer, weighted by the balance heuristic
+    /// \[Veach97\] against hitting the light by sampling the scattered direction.
     #[inline(always)]
     pub fn direct<S: Lanes>(
         &self,
@@ -40,7 +40,7 @@ impl ScatteringPoint<'_> {
         unshadowed * medium.transmittance_lanes(simd, &track, stream, notes)
     }
 
-    /// Weight of drawing the light against drawing the scattered direction.
+    /// Weight of sampling the light against sampling the scattered direction.
     fn balance(&self, light: &LightSample) -> f32 {
         if light.pdf.is_infinite() {
             1.0

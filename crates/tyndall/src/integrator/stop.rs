@@ -1,11 +1,11 @@
-//! When to stop in the middle of the work.
+//! When to stop in the middle of work.
 
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// What integrators poll after every scattering, so that a stop takes microseconds: whether the work was cancelled or its deadline
-/// has passed. One for each task, since it counts how often it was polled.
+/// Polled by integrators after every scattering, so that stopping takes microseconds: whether the work was cancelled or
+/// its deadline has passed. Each task has its own, since it counts how often it was polled.
 #[derive(Clone, Debug)]
 pub struct Stop<'a> {
     cancel: &'a AtomicBool,
@@ -14,12 +14,12 @@ pub struct Stop<'a> {
     expired: Cell<bool>,
 }
 
-/// When work must end; each task, on any thread, makes its own [`Stop`] from it.
+/// When work must end; each task, on any thread, creates its own [`Stop`] from it.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits<'a> {
-    /// Raised from elsewhere to stop soon.
+    /// Set by another thread to stop soon.
     pub cancel: &'a AtomicBool,
-    /// Point in time at which to stop.
+    /// Time at which to stop.
     pub deadline: Option<Instant>,
 }
 
@@ -31,20 +31,20 @@ impl<'a> Limits<'a> {
     }
 }
 
-/// The clock is read once in so many polls: reading it takes some 30 ns, a scattering takes hundreds.
+/// Number of polls per clock reading: reading the clock takes about 30 ns, a scattering takes hundreds.
 const QUESTIONS: u32 = 16;
 
-/// Never raised.
+/// Never set.
 static NEVER: AtomicBool = AtomicBool::new(false);
 
 impl<'a> Stop<'a> {
-    /// When `cancel` is raised, or at the deadline.
+    /// Stops when `cancel` is set, or at the deadline.
     #[must_use]
     pub fn when(cancel: &'a AtomicBool, deadline: Option<Instant>) -> Self {
         Self { cancel, deadline, asked: Cell::new(0), expired: Cell::new(false) }
     }
 
-    /// Never.
+    /// Never stops.
     #[must_use]
     pub fn never() -> Self {
         Self::when(&NEVER, None)

@@ -1,18 +1,18 @@
-//! Marching view rays through matter, front to back: how much each step covers, and when nothing behind it shows.
+//! Marching view rays through matter, front to back: the opacity of each step, and when nothing behind is visible.
 
 use crate::medium::{MarchNotes, PacketMarch, PacketSample};
 use crate::simd::{Lanes, one_minus_exp};
 use fearless_simd::prelude::*;
 
-/// Transmittance below which what is behind no longer shows.
+/// Transmittance below which matter behind is no longer visible.
 pub(crate) const OPAQUE: f32 = 1e-4;
 
-/// What a packet of view rays has met so far, one ray per lane.
+/// Opacity and depth accumulated by a packet of view rays, one ray per lane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Coverage<S: Lanes> {
     /// 1 - transmittance.
     pub alpha: S::f32s,
-    /// Sum of the distances inside the medium, weighted by what they add to `alpha`.
+    /// Sum of the sample distances inside the medium, weighted by what each sample adds to `alpha`.
     pub depth: S::f32s,
 }
 
@@ -25,15 +25,15 @@ impl<S: Lanes> Coverage<S> {
     }
 }
 
-/// Computes the light that a packet's samples send along their rays.
+/// Computes the light that a packet's samples contribute to their rays.
 pub(crate) trait Shader<S: Lanes, N> {
-    /// Shades a sample of each ray, of which the viewer sees the share `covered`, 0 in lanes that take none; false to stop
-    /// before the samples count.
+    /// Shades a sample of each ray. `covered` is the share that the viewer sees of it, 0 in lanes without a sample.
+    /// Returns false to stop before the samples count.
     fn shade(&mut self, simd: S, sample: &PacketSample<S>, covered: S::f32s, notes: &mut N) -> bool;
 }
 
-/// Marches until all rays have ended or are opaque. Where the shader stops the march, gives the steps to go on with, whose
-/// samples come again then.
+/// Marches until all rays have ended or are opaque. If the shader stops the march, returns the steps at which to
+/// resume; their samples are shaded again.
 #[inline(always)]
 pub(crate) fn composite<S: Lanes, N: MarchNotes<S>, H: Shader<S, N>>(
     simd: S,
@@ -47,7 +47,7 @@ pub(crate) fn composite<S: Lanes, N: MarchNotes<S>, H: Shader<S, N>>(
     loop {
         let k = march.step();
         let sample = march.next(notes)?;
-        // The sum of all shares so far leaves this transmittance.
+        // The remaining transmittance is 1 minus the sum of all shares so far.
         let covered = one_minus_exp(simd, sample.thickness) * (-seen.alpha + 1.0);
         if !shader.shade(simd, &sample, covered, notes) {
             return Some(k);

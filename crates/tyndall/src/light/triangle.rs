@@ -176,7 +176,7 @@ mod tests {
                     assert!((w.length() - 1.0).abs() < 1e-12, "{w}");
                     hits[usize::from(inside(part, w))] += 1;
                 }
-                let fit = ChiSquare::of(12).discrete(&[1.0 - share, share], &hits);
+                let fit = ChiSquare::among(12).discrete(&[1.0 - share, share], &hits);
                 assert!(fit.passes(), "{corners:?}, {share}: {fit}");
             }
         }

@@ -12,7 +12,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// From its corners.
+    /// The box with these corners.
     #[must_use]
     pub const fn new(min: Vec3, max: Vec3) -> Self {
         Self { min, max }
@@ -21,7 +21,7 @@ impl Bounds {
     /// The smallest box around some points.
     ///
     /// # Panics
-    /// If there is no point.
+    /// If there are no points.
     #[must_use]
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
         let mut points = points.into_iter();
@@ -54,13 +54,13 @@ impl Bounds {
         })
     }
 
-    /// Whether a point lies inside or on the border.
+    /// Whether a point is inside the box or on its border.
     #[must_use]
     pub fn contains(&self, p: Vec3) -> bool {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
     }
 
-    /// The stretch of a ray inside the box, cut to what lies ahead (slab method).
+    /// The interval of a ray inside the box and ahead of the ray's origin (slab method).
     #[inline]
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Interval {
@@ -68,7 +68,7 @@ impl Bounds {
         for axis in 0..3 {
             let (o, d) = (ray.origin[axis], ray.direction[axis]);
             if d == 0.0 {
-                // Parallel: 0 * infinity would be NaN, so decide by the side.
+                // Parallel to the slab: 0 * infinity would be NaN, so compare positions instead.
                 if o < self.min[axis] || o > self.max[axis] {
                     return Interval::up_to(0.0);
                 }

@@ -1,4 +1,4 @@
-//! The number conversions that may lose bits, in one file, each saying what it does with them.
+//! All number conversions that may lose bits; each documents how it rounds or saturates.
 
 /// Rounds down; saturates at the ends of `i32`; NaN becomes 0.
 #[inline]
@@ -10,7 +10,7 @@ pub fn floor_i32(x: f32) -> i32 {
     towards_zero.saturating_sub(i32::from(x < towards_zero as f32))
 }
 
-/// Cuts the fraction off; saturates at the ends of `i32`; NaN becomes 0.
+/// Truncates towards zero; saturates at the ends of `i32`; NaN becomes 0.
 #[inline]
 #[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "`as` saturates, which is what is documented")]
@@ -18,7 +18,7 @@ pub fn truncate(x: f32) -> i32 {
     x as i32
 }
 
-/// Cuts the fraction of a non-negative number off; negative numbers and NaN become 0.
+/// Truncates a non-negative number; negative numbers and NaN become 0.
 #[inline]
 #[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "`as` saturates, which is what is documented")]
@@ -38,7 +38,7 @@ pub fn round_u16(x: f32) -> u16 {
     (x + 0.5) as u16
 }
 
-/// Cuts the fraction of a non-negative number off; saturates at the largest `u64`; negative numbers and NaN become 0.
+/// Truncates a non-negative number; saturates at the largest `u64`; negative numbers and NaN become 0.
 #[inline]
 #[must_use]
 #[expect(
@@ -66,7 +66,7 @@ pub fn low_u32(x: u64) -> u32 {
     x as u32
 }
 
-/// An index known to fit 32 bits, because the film and the grids are bounded far below.
+/// An index known to fit in 32 bits, because the sizes of films and grids are limited far below that.
 ///
 /// # Panics
 /// If it does not fit: a broken invariant, never user data.

@@ -3,7 +3,7 @@
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Sub};
 
-/// A linear RGB triple: radiance, irradiance, albedo or weight, as its owner says.
+/// A linear RGB triple: radiance, irradiance, albedo or weight, depending on the context.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Rgb {
@@ -16,7 +16,7 @@ pub struct Rgb {
 }
 
 impl Rgb {
-    /// Nothing.
+    /// Zero in every channel.
     pub const BLACK: Self = Self::splat(0.0);
     /// One in every channel.
     pub const WHITE: Self = Self::splat(1.0);
@@ -77,7 +77,7 @@ impl Rgb {
         self.r.is_finite() && self.g.is_finite() && self.b.is_finite()
     }
 
-    /// From `self` (t = 0) to `other` (t = 1); between equal colours exactly that colour.
+    /// Interpolates from `self` (t = 0) to `other` (t = 1); between equal colours the result is exactly that colour.
     #[inline]
     #[must_use]
     pub fn lerp(self, other: Self, t: f32) -> Self {

@@ -1,8 +1,8 @@
-//! Directions in four bytes: the octahedron, unfolded \[Cigolle14\].
+//! Directions in four bytes: octahedral encoding \[Cigolle14\].
 
 use super::Vec3;
 
-/// A unit vector in two 16-bit numbers, at most 7e-5 radians off.
+/// A unit vector in two 16-bit numbers, with an error of at most 7e-5 radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(transparent)]
 pub struct PackedDirection(u32);
@@ -11,7 +11,7 @@ pub struct PackedDirection(u32);
 pub(crate) const HALF: f32 = 32767.0;
 
 impl PackedDirection {
-    /// The nearest direction, but for rounding, to a unit vector.
+    /// The nearest encoded direction to a unit vector, up to rounding.
     #[inline]
     #[must_use]
     pub fn new(v: Vec3) -> Self {
@@ -36,13 +36,13 @@ impl PackedDirection {
         v * (1.0 / v.length())
     }
 
-    /// Both numbers, x in the low half; for kernels over lanes, which unpack the same way.
+    /// Both numbers, x in the low half; for SIMD kernels, which unpack the same way.
     #[inline]
     pub(crate) fn word(self) -> u32 {
         self.0
     }
 
-    /// From what [`Self::word`] gave.
+    /// From the result of [`Self::word`].
     #[inline]
     pub(crate) fn from_word(word: u32) -> Self {
         Self(word)
@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn directions_come_back() {
+    fn directions_survive_packing() {
         let axes = [Vec3::X, Vec3::Y, Vec3::Z];
         for v in axes.into_iter().flat_map(|v| [v, -v]) {
             assert_eq!(PackedDirection::new(v).unpack(), v);
@@ -65,7 +65,7 @@ mod tests {
             let v = Vec3::new((1.0 - z * z).sqrt() * c, (1.0 - z * z).sqrt() * s, z);
             let back = PackedDirection::new(v).unpack();
             assert!((back - v).length() < 7e-5 && (back.length() - 1.0).abs() < 3e-7, "{v}: {back}");
-            // What has come back once stays.
+            // A decoded vector encodes to the same word again.
             let again = PackedDirection::new(back);
             assert_eq!(again, PackedDirection::new(v));
         }

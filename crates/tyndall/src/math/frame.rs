@@ -14,7 +14,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Builds a frame around a unit vector without a branch on its direction \[Duff17\].
+    /// Builds a frame around a unit vector, without branching \[Duff17\].
     #[inline]
     #[must_use]
     pub fn around(w: Vec3) -> Self {
@@ -28,7 +28,7 @@ impl Frame {
         }
     }
 
-    /// The frame turned about its axis by an angle of which the sine and cosine are given.
+    /// The frame rotated about its axis by an angle given by its sine and cosine.
     #[inline]
     #[must_use]
     pub fn turned(&self, (sin, cos): (f32, f32)) -> Self {
@@ -36,14 +36,14 @@ impl Frame {
         Self { u: u * cos + v * sin, v: v * cos - u * sin, w }
     }
 
-    /// From frame coordinates to the space of the axis.
+    /// From frame coordinates to the space in which the axis is given.
     #[inline]
     #[must_use]
     pub fn to_world(&self, v: Vec3) -> Vec3 {
         self.u * v.x + self.v * v.y + self.w * v.z
     }
 
-    /// From the space of the axis to frame coordinates.
+    /// From the space in which the axis is given to frame coordinates.
     #[inline]
     #[must_use]
     pub fn to_local(&self, v: Vec3) -> Vec3 {

@@ -1,4 +1,4 @@
-//! Colours, rays, frames and boxes; vectors come from `glam`.
+//! Colours, rays, frames and boxes; the vector types are from `glam`.
 
 pub mod bounds;
 pub mod cast;

@@ -1,19 +1,19 @@
-//! Rays and the stretch of a ray that matters.
+//! Rays and intervals along them.
 
 use super::Vec3;
 
-/// A half line. `direction` has unit length in world space; in index space it is scaled so that
-/// `t` stays a world distance.
+/// A half-line. `direction` has unit length in world space; in index space it is scaled so that
+/// `t` remains a world distance.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Ray {
-    /// Where it starts.
+    /// Origin.
     pub origin: Vec3,
-    /// Where it goes.
+    /// Direction.
     pub direction: Vec3,
 }
 
 impl Ray {
-    /// From its parts.
+    /// From its origin and direction.
     #[inline]
     #[must_use]
     pub const fn new(origin: Vec3, direction: Vec3) -> Self {
@@ -28,7 +28,7 @@ impl Ray {
     }
 }
 
-/// A closed stretch `[start, end]` of a ray; empty when `start >= end`.
+/// A closed interval `[start, end]` of a ray; empty when `start >= end`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// Nearest distance.
@@ -38,24 +38,24 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// All that lies ahead.
+    /// From 0 to infinity.
     pub const AHEAD: Self = Self { start: 0.0, end: f32::INFINITY };
 
-    /// From nothing to `end`.
+    /// From 0 to `end`.
     #[inline]
     #[must_use]
     pub const fn up_to(end: f32) -> Self {
         Self { start: 0.0, end }
     }
 
-    /// Whether no point lies in it.
+    /// Whether it is empty.
     #[inline]
     #[must_use]
     pub fn is_empty(self) -> bool {
         self.start >= self.end || self.start.is_nan() || self.end.is_nan()
     }
 
-    /// The common part of both.
+    /// The intersection of both.
     #[inline]
     #[must_use]
     pub fn intersect(self, other: Self) -> Self {

@@ -59,7 +59,7 @@ mod tests {
     fn directions_follow_their_densities() {
         let check = |warp: &dyn Fn([f32; 2]) -> Vec3, pdf: &dyn Fn([f32; 3]) -> f32| {
             let sample = |u: [f32; 2]| Some(warp(u).to_array());
-            ChiSquare::of(4).directions(sample, |w| f64::from(pdf(w))).assert();
+            ChiSquare::among(4).directions(sample, |w| f64::from(pdf(w))).assert();
         };
         check(&sphere, &|_| 0.25 / PI);
         check(&cosine_hemisphere, &|w| w[2].max(0.0) / PI);

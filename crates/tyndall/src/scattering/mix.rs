@@ -248,7 +248,7 @@ mod tests {
             samples: 200_000,
             rows: 256,
             columns: 16,
-            ..ChiSquare::of(2 * mixes(normal()).len())
+            ..ChiSquare::among(2 * mixes(normal()).len())
         };
         for (i, event) in mixes(normal()).into_iter().enumerate() {
             let degrees = [0.0_f32, 50.0, 86.0][i % 3];
@@ -294,7 +294,7 @@ mod tests {
                 }
                 for (i, (mean, integral)) in means.iter().zip(integrals).enumerate() {
                     let variance = mean.variance_of_mean() + (QUADRATURE_ERROR * integral).powi(2);
-                    let test = ZTest::new(mean.mean(), variance, integral).of(tests);
+                    let test = ZTest::new(mean.mean(), variance, integral).among(tests);
                     assert!(test.passes(), "channel {i}, {event:?}, {degrees} degrees: {test}");
                 }
             }

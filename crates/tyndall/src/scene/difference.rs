@@ -1,63 +1,63 @@
-//! What an edit changed: the only source of truth about it.
+//! What an edit changed; nothing else decides this.
 
 use super::Scene;
 use crate::transfer::TransferDifference;
 use std::collections::HashMap;
 
-/// What changed from one scene to another, in terms of what light transport reads. Settings of display (exposure, tone) and of
-/// stopping (samples) are not part of a scene.
+/// What changed from one scene to another, in terms of what light transport reads. Settings for display (exposure,
+/// tone) and for stopping (samples) are not part of a scene.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
-#[expect(clippy::struct_excessive_bools, reason = "each is a thing by itself that changed or did not")]
+#[expect(clippy::struct_excessive_bools, reason = "each is an independent thing that changed or did not")]
 pub struct Difference {
-    /// Values that now mean other optics.
+    /// Data values whose optical properties changed.
     pub transfer: TransferDifference,
-    /// The new density over the old where that alone moved extinction; `None` where it did not change. Infinite where
-    /// there was none before.
+    /// The new density divided by the old; `None` if it did not change, infinite if the old one was zero. Extinction
+    /// changes due to the transfer function are not included.
     pub density: Option<f32>,
     /// The phase function.
     pub phase: bool,
-    /// How surfaces reflect, or how strong a gradient makes one, where matter has any.
+    /// How surfaces reflect, or how strong a gradient makes a surface, if the matter has any.
     pub surfaces: bool,
-    /// What is cut away.
+    /// The clips.
     pub clip: bool,
-    /// Samples, grid or interpolation.
+    /// Voxel values, grid or interpolation.
     pub volume: bool,
-    /// Edge of the majorant cells, which changes the numbers that tracking draws but not the expected picture.
+    /// Edge of the majorant cells, which changes the random numbers that tracking uses but not the expected picture.
     pub majorants: bool,
-    /// What became of the lights.
+    /// Changes to the lights.
     pub lights: LightsDifference,
-    /// From where the picture is taken.
+    /// The camera.
     pub camera: bool,
     /// The picture's size.
     pub size: bool,
-    /// What is behind everything.
+    /// The background.
     pub background: bool,
-    /// The method, its own settings, or the scatterings that it keeps.
+    /// The method, its settings, or the maximum number of scatterings.
     pub method: bool,
-    /// The random numbers.
+    /// The seed of the random numbers.
     pub seed: bool,
 }
 
-/// What became of the lights of a scene.
+/// Changes to the lights of a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LightsDifference {
-    /// Of every light of the new scene, where it comes from.
+    /// For every light of the new scene, its counterpart in the old one.
     pub origins: Vec<LightOrigin>,
-    /// Numbers of the old lights that are gone.
+    /// Indices of the old lights that were removed.
     pub removed: Vec<usize>,
-    /// Whether any light's name changed or moved to another light: random numbers that are keyed by name then change.
+    /// Whether any light's name changed or moved to another light; random numbers keyed by name then change.
     pub names: bool,
 }
 
-/// Where a light comes from.
+/// The counterpart of a light in the old scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightOrigin {
-    /// It is the old scene's light of this number, as it was.
+    /// The old light of this index, unchanged.
     Same(usize),
-    /// It is the old scene's light of this number, changed.
+    /// The old light of this index, changed.
     Changed(usize),
-    /// It was not there.
+    /// None: the light is new.
     New,
 }
 
@@ -87,7 +87,7 @@ impl Difference {
         }
     }
 
-    /// Whether nothing that light reads has changed.
+    /// Whether nothing that light transport reads has changed.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         !(self.view()
@@ -98,7 +98,7 @@ impl Difference {
             || !self.transfer.ior.is_empty())
     }
 
-    /// Whether view rays, or what is done with them, changed.
+    /// Whether view rays, or how they are processed, changed.
     #[must_use]
     pub fn view(&self) -> bool {
         self.camera || self.size || self.background || self.method
@@ -120,7 +120,7 @@ impl Difference {
 }
 
 impl LightsDifference {
-    /// Lights are matched by name, and those without a match by their number.
+    /// Lights are matched by name, and those without a match by index.
     fn between(old: &Scene, new: &Scene) -> Self {
         let [was, is] = [old, new].map(|scene| scene.lights.lights());
         let [old_names, new_names] = [old, new].map(|scene| &scene.light_names);
@@ -142,8 +142,8 @@ impl LightsDifference {
         Self { origins, removed, names: old_names != new_names }
     }
 
-    /// Whether all lights are unchanged and in the same order, whatever their names: methods that choose lights by index see no
-    /// difference.
+    /// Whether all lights are unchanged and in the same order, whatever their names, so that nothing changes for
+    /// methods that choose lights by index.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         let in_place = |(i, origin): (usize, &LightOrigin)| *origin == LightOrigin::Same(i);
@@ -151,7 +151,7 @@ impl LightsDifference {
     }
 }
 
-/// The first light of each name.
+/// The index of the first light of each name.
 fn numbers(names: &[Option<String>]) -> HashMap<&String, usize> {
     names.iter().enumerate().rev().filter_map(|(i, name)| Some((name.as_ref()?, i))).collect()
 }

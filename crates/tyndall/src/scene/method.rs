@@ -1,15 +1,15 @@
-//! The method of computing light that a scene asks for, with its settings; the scene knows neither.
+//! The rendering method that a scene selects, with its settings; the scene knows nothing about either.
 
 use std::any::Any;
 use std::fmt::Debug;
 use std::sync::Arc;
 
-/// The settings of some method.
+/// The settings of a method.
 pub trait MethodSettings: Any + Debug + Send + Sync {
     /// The method's name in the scene document.
     fn name(&self) -> &'static str;
 
-    /// Whether both are settings of the same method, and the same ones.
+    /// Whether both are equal settings of the same method.
     fn equals(&self, other: &dyn MethodSettings) -> bool;
 }
 

@@ -1,4 +1,4 @@
-//! A session: a scene, its integrator and the film, refined slice by slice.
+//! A session: a scene, its integrator and the film, refined in slices of time.
 
 use crate::film::{Film, Goal, Image, Stride, Tone, Viewer};
 use crate::integrator::{
@@ -10,21 +10,21 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-/// When a slice of work ends; the first limit met counts.
+/// When a slice of work ends: as soon as any limit is reached.
 #[derive(Clone, Debug)]
 pub struct Budget {
-    /// Samples that every pixel shall have in the end.
+    /// Number of samples to reach in every pixel.
     pub samples: u32,
-    /// Pixels that shall have one sample more.
+    /// Pixels that are to have one sample more.
     pub more: Option<Stride>,
-    /// Point in time at which to stop; pixels that have had their turn then have a sample more than others.
+    /// Time at which to stop; some pixels may then have one sample more than others.
     pub deadline: Option<Instant>,
-    /// Raised from elsewhere to stop soon.
+    /// Set by another thread to stop soon.
     pub cancel: Arc<AtomicBool>,
 }
 
 impl Budget {
-    /// So many samples in every pixel, whatever it takes.
+    /// This many samples in every pixel, without a time limit.
     #[must_use]
     pub fn samples(samples: u32) -> Self {
         Self { samples, more: None, deadline: None, cancel: Arc::default() }
@@ -41,60 +41,62 @@ impl Budget {
     }
 }
 
-/// How far a session is.
+/// Progress of a session.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Progress {
-    /// Samples that every pixel has at least.
+    /// Minimum number of samples per pixel.
     pub samples: u32,
     /// Samples per pixel on average.
     pub mean_samples: f64,
+    /// Fraction of the pixels that have a sample.
+    pub coverage: f64,
 }
 
 /// Seconds that a stage of the work took.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StageTime {
-    /// Which stage.
+    /// Name of the stage.
     pub name: &'static str,
-    /// How long.
+    /// Time spent.
     pub seconds: f64,
 }
 
 /// Time spent since the last edit.
 #[derive(Clone, Copy, Debug, Default)]
 struct Spent {
-    /// On what samples need beforehand.
+    /// On preparation before sampling.
     preparing: Duration,
     sampling: Duration,
 }
 
-/// Renders a scene on threads of its own.
+/// Renders a scene on a given thread pool.
 pub struct Session {
     scene: Scene,
     engine: Box<dyn Engine>,
     film: Film,
     threads: Arc<rayon::ThreadPool>,
     resources: Resources,
-    /// Samples per pixel, on average, that the last edit left in the film.
+    /// Mean number of samples per pixel that the last edit left in the film.
     left: f64,
     spent: Spent,
 }
 
 impl Session {
-    /// Prepares a scene; `threads` is shared with whoever made the scene, never the global pool.
+    /// Prepares a scene; `threads` is shared with the code that built the scene, never the global pool.
     #[must_use]
     pub fn new(scene: Scene, threads: Arc<rayon::ThreadPool>) -> Self {
         Self::with_level(scene, threads, Level::best())
     }
 
-    /// [`Self::new`] with certain vector instructions instead of the widest.
+    /// [`Self::new`] with the given vector instructions instead of the widest.
     #[must_use]
     pub fn with_level(scene: Scene, threads: Arc<rayon::ThreadPool>, level: Level) -> Self {
         Self::with_resources(scene, threads, Resources { level, edit_memory: 0 })
     }
 
-    /// [`Self::new`] with certain vector instructions, and with memory for what serves edits to come alone. That changes no
-    /// picture.
+    /// [`Self::new`] with the given vector instructions, and with memory for data that only future edits use. That
+    /// memory does not change the picture.
     #[must_use]
     pub fn with_resources(scene: Scene, threads: Arc<rayon::ThreadPool>, resources: Resources) -> Self {
         let engine = threads.install(|| method_of(&scene.render.method).start(&scene, &resources));
@@ -108,8 +110,8 @@ impl Session {
         self.engine = threads.install(|| method_of(&scene.render.method).start(scene, resources));
     }
 
-    /// Goes on with an edited scene; gives what the edit changed. This is the only function that discards light, and the
-    /// difference alone decides what: after it the session will come to the picture that a new one would.
+    /// Continues with an edited scene; returns what the edit changed. This is the only function that discards results,
+    /// and the difference alone decides which: the session then renders the same picture as a new one.
     pub fn set_scene(&mut self, scene: Scene) -> Difference {
         let difference = Difference::between(&self.scene, &scene);
         let old = std::mem::replace(&mut self.scene, scene);
@@ -128,7 +130,7 @@ impl Session {
         difference
     }
 
-    /// What was computed since the last edit, or since the beginning, and what is kept for edits to come.
+    /// What was computed since the last edit, or since the beginning, and what is kept for future edits.
     #[must_use]
     pub fn report(&self) -> MethodReport {
         let pixels = self.scene.size.iter().map(|&n| n as usize).product();
@@ -136,13 +138,13 @@ impl Session {
         self.engine.report(&pixels)
     }
 
-    /// Of each kind of work item the share that was computed since the last edit, or since the beginning.
+    /// For each kind of work item, the share that was computed since the last edit, or since the beginning.
     #[must_use]
     pub fn recomputed(&self) -> Vec<WorkShare> {
         self.report().recomputed
     }
 
-    /// A copy of what the session keeps through edits beside pixels, for checks; `None` where that is nothing.
+    /// A copy of what the session keeps across edits besides pixels, for tests; `None` if it keeps nothing.
     #[must_use]
     pub fn kept_items(&self) -> Option<Box<dyn KeptItems>> {
         self.engine.kept_items()
@@ -158,13 +160,13 @@ impl Session {
         preparation.into_iter().chain([time(stages.sampling, sampling)]).collect()
     }
 
-    /// Threads that work.
+    /// Number of threads.
     #[must_use]
     pub fn threads(&self) -> usize {
         self.threads.current_num_threads()
     }
 
-    /// What is rendered.
+    /// The scene being rendered.
     #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene
@@ -187,9 +189,9 @@ impl Session {
         self.threads.install(|| viewer.look(&self.film, tone, self.resources.level));
     }
 
-    /// Works until the budget is spent, pass by pass over all tiles and the first pass from coarse pixels to fine ones, so that the
-    /// picture is complete as early as possible. Every sample follows from its pixel and number, so the bits do not depend on
-    /// threads or slices.
+    /// Renders until the budget is spent, pass by pass over all tiles, and the first pass from coarse pixels to fine ones, so that
+    /// the whole picture shows as early as possible. Every sample is determined by its pixel and number, so the finished picture
+    /// does not depend on threads or slices.
     pub fn refine(&mut self, budget: &Budget) -> Progress {
         let limits = Limits { cancel: &budget.cancel, deadline: budget.deadline };
         let Self { scene, engine, film, threads, spent, .. } = self;
@@ -201,7 +203,7 @@ impl Session {
             if !prepared {
                 break;
             }
-            // Once it delays no picture noticeably, several passes at once save threads from waiting for each other.
+            // Later, several passes at once do not delay the picture noticeably, and threads wait less for each other.
             let passes = (so_far / 4).clamp(1, 16).min(engine.samples_at_once());
             let pass = Goal::samples(so_far.saturating_add(passes));
             let next = if so_far == 0 { film.coarse_goal().unwrap_or(pass) } else { pass };
@@ -213,14 +215,18 @@ impl Session {
         self.progress()
     }
 
-    /// How far it is.
+    /// Progress so far.
     #[must_use]
     pub fn progress(&self) -> Progress {
-        Progress { samples: self.film.samples(), mean_samples: self.film.mean_samples() }
+        Progress {
+            samples: self.film.samples(),
+            mean_samples: self.film.mean_samples(),
+            coverage: self.film.coverage(),
+        }
     }
 
-    /// Noise of the picture so far, see [`Film::relative_error`]; `None` for a method without any, whose
-    /// samples differ only by the pixel filter. Costs a walk over all pixels.
+    /// Noise of the picture so far, see [`Film::relative_error`]; `None` for a method without noise, whose
+    /// samples differ only by the pixel filter. Visits all pixels.
     #[must_use]
     pub fn relative_error(&self) -> Option<f64> {
         if self.engine.has_noise() { self.film.relative_error() } else { None }

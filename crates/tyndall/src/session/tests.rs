@@ -1,4 +1,4 @@
-//! What holds for every method of the list, the one for tests among them.
+//! Tests of every method in the list, including the one for tests.
 
 use super::{Budget, Session};
 use crate::camera::{AutoView, FitLens, fit};
@@ -20,7 +20,7 @@ use std::sync::{Arc, LazyLock};
 static THREADS: LazyLock<Arc<rayon::ThreadPool>> =
     LazyLock::new(|| Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads")));
 
-/// The same samples in every scene, so that an edit does not begin anew because of them.
+/// The same voxels in every scene, so that an edit does not restart because they changed.
 static VOLUME: LazyLock<Arc<Volume>> =
     LazyLock::new(|| Arc::new(Field::new(Kind::Cloud, [12, 11, 10], 1).volume().expect("a field")));
 
@@ -87,7 +87,7 @@ fn every_method_is_found_by_its_name_and_explains_itself() {
     }
 }
 
-/// From each method to each: the picture is the one from nothing, and so is what comes after an edit.
+/// After a switch from any method to any other, and after an edit, the picture equals that of a new session.
 #[test]
 fn every_method_follows_every_other() {
     let drafts = || METHODS.iter().map(|method| method.draft(&method.default_settings()));

@@ -1,41 +1,41 @@
-//! Reading from many addresses at once: the one thing here that the compiler cannot check.
+//! Reading from many addresses at once: the only code here that the compiler cannot check.
 //!
-//! Every public function clamps its addresses to the slice, so that none can be used wrongly.
+//! Every public function clamps its addresses to the slice, so that no call can be unsound.
 
 use crate::math::cast;
 use fearless_simd::prelude::*;
 use fearless_simd::{Fallback, Simd};
 
-/// The lanes that kernels are written over.
+/// The SIMD lanes that kernels are generic over.
 pub(crate) trait Lanes:
     Simd<f32s: SimdFloat<Self, Bits = <Self as Simd>::u32s>, i32s: Bytes<Bytes = Self::u8s>>
 {
     /// Four bytes from each address `base + SCALE * index`, as a little-endian word.
     ///
     /// # Safety
-    /// `SCALE` is 1, 2, 4 or 8, every index is below 2^31, and from every address four bytes can be read.
+    /// `SCALE` is 1, 2, 4 or 8, every index is below 2^31, and four bytes can be read at every address.
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s;
 
     /// Lanes of a vector.
     const WIDTH: usize = <Self::f32s as SimdBase<Self>>::LEN;
 
-    /// Single-precision numbers; an index past the end reads the last.
+    /// Gathers single-precision numbers; an index past the end reads the last one.
     #[inline(always)]
     fn numbers(self, table: &[f32], index: Self::u32s) -> Self::f32s {
         let index = self.at_most(index, table.len() - 1);
-        // SAFETY: the index is at most that of the last number, each of which has four bytes.
+        // SAFETY: the index is at most that of the last number, and each number has four bytes.
         let words = unsafe { self.gather_words::<4>(table.as_ptr().cast(), index) };
         Self::f32s::from_bits(words)
     }
 
-    /// The words that begin at the `index`-th of numbers of `size` bytes; a word that would reach past the end is read
-    /// from the last place where it does not.
+    /// The words that begin at the `index`-th number, where each number has `size` bytes; a word that would reach past
+    /// the end is read from the last index where it fits.
     #[inline(always)]
     fn words<T: bytemuck::Pod>(self, numbers: &[T], index: Self::u32s) -> Self::u32s {
         const { assert!(matches!(size_of::<T>(), 1 | 2 | 4)) };
         let index = self.at_most(index, numbers.len() - 4 / size_of::<T>());
         let base = numbers.as_ptr().cast();
-        // SAFETY: the index leaves room for the numbers that make four bytes.
+        // SAFETY: after the clamped index there are enough numbers for four bytes.
         unsafe {
             match size_of::<T>() {
                 1 => self.gather_words::<1>(base, index),
@@ -45,7 +45,7 @@ pub(crate) trait Lanes:
         }
     }
 
-    /// Clamps indices to a last one, below 2^31.
+    /// Clamps indices to the last valid one, which is below 2^31.
     #[inline(always)]
     fn at_most(self, index: Self::u32s, last: usize) -> Self::u32s {
         index.min(Self::u32s::splat(self, cast::fit_u32(last.min(i32::MAX as usize))))
@@ -55,7 +55,7 @@ pub(crate) trait Lanes:
 impl Lanes for Fallback {
     #[inline(always)]
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
-        // SAFETY: what the caller promises.
+        // SAFETY: guaranteed by the caller.
         unsafe { one_by_one::<Self, SCALE>(self, base, index) }
     }
 }
@@ -64,7 +64,7 @@ impl Lanes for Fallback {
 impl Lanes for fearless_simd::Neon {
     #[inline(always)]
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
-        // SAFETY: what the caller promises.
+        // SAFETY: guaranteed by the caller.
         unsafe { one_by_one::<Self, SCALE>(self, base, index) }
     }
 }
@@ -73,7 +73,7 @@ impl Lanes for fearless_simd::Neon {
 impl Lanes for fearless_simd::Avx2 {
     #[inline(always)]
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
-        // SAFETY: the token proves the instructions; the addresses are what the caller promises.
+        // SAFETY: the token proves that the instructions exist; the caller guarantees the addresses.
         let words = unsafe { std::arch::x86_64::_mm256_i32gather_epi32::<SCALE>(base.cast(), index.into()) };
         words.simd_into(self)
     }
@@ -83,13 +83,13 @@ impl Lanes for fearless_simd::Avx2 {
 impl Lanes for fearless_simd::Avx512 {
     #[inline(always)]
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
-        // SAFETY: the token proves the instructions; the addresses are what the caller promises.
+        // SAFETY: the token proves that the instructions exist; the caller guarantees the addresses.
         let words = unsafe { std::arch::x86_64::_mm512_i32gather_epi32::<SCALE>(index.into(), base.cast()) };
         words.simd_into(self)
     }
 }
 
-/// The gather of processors that have none.
+/// The gather for processors without a gather instruction.
 ///
 /// # Safety
 /// As [`Lanes::gather_words`].
@@ -98,7 +98,7 @@ unsafe fn one_by_one<S: Lanes, const SCALE: i32>(simd: S, base: *const u8, index
     let index = index.as_slice();
     S::u32s::from_fn(simd, |lane| {
         let offset = index[lane] as usize * SCALE.cast_unsigned() as usize;
-        // SAFETY: four bytes can be read there, as the caller promises, at any alignment.
+        // SAFETY: the caller guarantees that four bytes can be read there; any alignment is allowed.
         u32::from_le_bytes(unsafe { base.add(offset).cast::<[u8; 4]>().read() })
     })
 }

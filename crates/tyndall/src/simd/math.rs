@@ -1,16 +1,16 @@
-//! Functions that the lanes' library lacks.
+//! Functions that `fearless_simd` lacks.
 
 use super::Lanes;
 use crate::math::direction::HALF;
 use fearless_simd::prelude::*;
 
-/// `1 - exp(-x)` for `x >= 0`, to 3e-7 of itself: the share of light that an optical thickness takes.
+/// `1 - exp(-x)` for `x >= 0`, with a relative error of 3e-7: the fraction of light removed by an optical thickness.
 #[inline(always)]
 pub(crate) fn one_minus_exp<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
-    // exp(-x) = 2^n e^r with |r| <= ln 2 / 2; below 2^-60 nothing is left of it beside 1.
+    // exp(-x) = 2^n e^r with |r| <= ln 2 / 2; below 2^-60 it is negligible next to 1.
     let n = (x * -std::f32::consts::LOG2_E).max(-60.0).round_ties_even();
     let r = (n * -LN_2_LOW) + (n * -LN_2_HIGH - x.min(60.0));
-    // Taylor's series of e^r - 1 keeps small thicknesses exact.
+    // The Taylor series of e^r - 1 keeps small thicknesses accurate.
     let mut series = S::f32s::splat(simd, 1.0 / 5040.0);
     for coefficient in [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0] {
         series = series.mul_add(r, S::f32s::splat(simd, coefficient));
@@ -22,7 +22,7 @@ pub(crate) fn one_minus_exp<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
     (one - power) - power * (series * r)
 }
 
-/// ln 2 in two parts, of which multiples of the first up to 2^8 are exact.
+/// ln 2 in two parts; multiples of the first up to 2^8 are exact.
 const LN_2_HIGH: f32 = 0.693_359_4;
 const LN_2_LOW: f32 = -2.121_944_4e-4;
 
@@ -58,7 +58,7 @@ pub(crate) fn exp2_unfused<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
     series * S::f32s::from_bits(power)
 }
 
-/// The unit vectors of [`PackedDirection`](crate::math::PackedDirection)s.
+/// Unpacks [`PackedDirection`](crate::math::PackedDirection)s to unit vectors.
 #[inline(always)]
 pub(crate) fn unpack_directions<S: Lanes>(simd: S, words: S::u32s) -> [S::f32s; 3] {
     let (low, high): (S::i32s, S::i32s) = ((words & 0xffff).bitcast(), (words >> 16).bitcast());

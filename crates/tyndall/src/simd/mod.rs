@@ -1,10 +1,10 @@
-//! Vector instructions, chosen when the program runs.
+//! Vector instructions, selected at run time.
 //!
-//! A kernel is written once, over the lanes of `fearless_simd`, and compiled for every [`Level`]; what that library lacks,
-//! reading from many addresses at once, is in `gather`. Fused multiply-add rounds once where the scalar level rounds twice, so
-//! pictures of two levels may differ in their last bits; those of one level never do.
+//! A kernel is written once, over the lanes of `fearless_simd`, and compiled for every [`Level`]; gather loads, which
+//! that library lacks, are in `gather`. Fused multiply-add rounds once where the scalar level rounds twice, so pictures
+//! of two levels may differ in their last bits; those of one level never do.
 
-#[expect(unsafe_code, reason = "gathers read through pointers; each says why that is sound")]
+#[expect(unsafe_code, reason = "gathers read through pointers; a comment at each explains why it is sound")]
 mod gather;
 mod math;
 
@@ -31,7 +31,7 @@ enum Token {
     Avx512(simd::Avx512),
 }
 
-/// No level of that name, or none that this processor has.
+/// There is no level of that name, or this processor lacks it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("no vector instructions `{found}` on this processor; it has {available}")]
 pub struct UnknownLevel {
@@ -39,23 +39,24 @@ pub struct UnknownLevel {
     available: String,
 }
 
-/// What is compiled for every level.
+/// A computation that is compiled for every level.
 pub(crate) trait Kernel {
-    /// What it gives.
+    /// Its result.
     type Output;
 
-    /// Must be `#[inline(always)]`, like all that it calls and that works on lanes, or it misses the instructions.
+    /// Must be `#[inline(always)]`, like everything it calls that works on lanes; otherwise the level's instructions
+    /// are not used.
     fn run<S: Lanes>(self, simd: S) -> Self::Output;
 }
 
 impl Level {
-    /// The widest that this processor has.
+    /// The widest level that this processor has.
     #[must_use]
     pub fn best() -> Self {
-        *Self::available().last().expect("the scalar level is everywhere")
+        *Self::available().last().expect("the scalar level is always available")
     }
 
-    /// All that this processor has, narrowest first.
+    /// All levels that this processor has, narrowest first.
     #[must_use]
     pub fn available() -> Vec<Self> {
         let mut levels: Vec<Self> = match simd::Level::fallback() {
@@ -138,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_go_by_name() {
+    fn levels_are_found_by_name() {
         for level in Level::available() {
             assert_eq!(level.name().parse(), Ok(level));
         }

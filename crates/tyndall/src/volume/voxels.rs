@@ -107,14 +107,14 @@ impl Voxels {
     /// `slope` tells which end of the stored samples is the small one.
     pub(super) fn mend_non_finite(&mut self, slope: f64) -> u64 {
         match self {
-            Self::F32(data) => mend(data, f32::is_finite, f32::INFINITY.copysign(cast::single(slope)), 0.0),
-            Self::F64(data) => mend(data, f64::is_finite, f64::INFINITY.copysign(slope), 0.0),
+            Self::F32(data) => fix(data, f32::is_finite, f32::INFINITY.copysign(cast::single(slope)), 0.0),
+            Self::F64(data) => fix(data, f64::is_finite, f64::INFINITY.copysign(slope), 0.0),
             _ => 0,
         }
     }
 }
 
-fn mend<T: Voxel>(data: &mut [T], finite: impl Fn(T) -> bool, largest: T, zero: T) -> u64 {
+fn fix<T: Voxel>(data: &mut [T], finite: impl Fn(T) -> bool, largest: T, zero: T) -> u64 {
     let mut bad = 0;
     let mut range: Option<[T; 2]> = None;
     for &v in data.iter() {

@@ -1,4 +1,4 @@
-//! What matter covers, how far away it is, and what shows behind it.
+//! Coverage (alpha), depth, and the background seen through matter.
 
 use crate::scenes::{Setup, blocks, mean, slab, trace};
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
 use tyndall::transfer::{Optics, Point};
 
-/// A bright wall behind conservative matter that no light falls on.
+/// Conservative matter that no light falls on, before a bright background.
 fn before_a_wall(thickness: f32) -> Scene {
     let mut scene = slab(thickness, 1.0, Phase::Isotropic).scene();
     scene.background = Background::Color(Rgb::splat(3.0));
@@ -27,7 +27,7 @@ type Part = fn(&PixelSample) -> f32;
 fn alpha_depth_and_background_have_closed_forms() {
     const PARTS: [(&str, Part); 3] =
         [("radiance", |s| s.radiance.g), ("alpha", |s| s.alpha), ("depth", |s| s.depth)];
-    // The slab's top is 2 from the start, along the ray; the camera looks down, the ray aslant.
+    // The ray starts 2 from the slab's top, along its oblique direction; the camera looks straight down.
     let cos = 0.6_f64;
     let out = Vec3::new(0.8, 0.0, 0.6);
     let ray = Ray::new(Vec3::Z * 0.5 + out * 2.0, -out);
@@ -38,7 +38,7 @@ fn alpha_depth_and_background_have_closed_forms() {
         let through = (-tau).exp();
         let inside = (1.0 - through * (1.0 + tau)) / sigma;
         let expected = [3.0 * through, 1.0 - through, cos * (2.0 * (1.0 - through) + inside)];
-        // The slab's voxel is wide: steps count in its cube root.
+        // Steps are in units of the cube root of the voxel's volume, which is large for this wide slab.
         let march = RayMarch::of_scene(
             &scene,
             &Settings { step: 1e-3 / 1e5_f32.powf(2.0 / 3.0), light_samples: 1 },
@@ -57,10 +57,10 @@ fn alpha_depth_and_background_have_closed_forms() {
     }
 }
 
-/// Samples spread over the whole pixel, evenly.
+/// Samples are spread uniformly over the whole pixel.
 #[test]
 fn a_pixel_is_covered_as_far_as_matter_fills_it() {
-    // Matter left of x = 1/4, of which a pixel from -1/2 to 1/2 sees three quarters.
+    // Matter fills x < 1/4, which is three quarters of a pixel from -1/2 to 1/2.
     let nothing = Optics { opacity: 0.0, ..Optics::default() };
     let points = vec![Point { value: 0.0, optics: nothing }, Point { value: 1.0, optics: Optics::default() }];
     let half = blocks([64; 3], [2.0; 3], |p| f32::from(u8::from(p[0] < 40)));
@@ -77,6 +77,6 @@ fn a_pixel_is_covered_as_far_as_matter_fills_it() {
     let walked = covered(PathTracer::usual());
     let marched = covered(RayMarch::choose(Settings { step: 0.5, light_samples: 1 }));
     for share in [walked, marched] {
-        assert!((share - 0.75).abs() < 2e-3, "{share} of the pixel");
+        assert!((share - 0.75).abs() < 2e-3, "{share} of the pixel is covered");
     }
 }

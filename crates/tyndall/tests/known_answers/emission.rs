@@ -1,4 +1,4 @@
-//! Glowing matter is a light: what it shows of itself, and what it sends to other matter.
+//! Glowing matter is a light: seen directly, and as it illuminates other matter.
 
 use crate::scenes::{Setup, blocks, radiance};
 use std::f64::consts::PI;
@@ -10,7 +10,7 @@ use tyndall::simd::Level;
 use tyndall::transfer::{Optics, Point};
 use tyndall_testing::{Mean, ZTest};
 
-/// Vacuum at 0, glowing black matter at 1, dark scattering matter at 2; flat in between.
+/// Vacuum at value 0, glowing black matter at 1, dark scattering matter at 2; constant within 0.5 of each value.
 fn three_materials(glow: f32, glow_opacity: f32, slab_opacity: f32, slab_albedo: f32) -> Vec<Point> {
     let look = |optics: Optics, at: f32| [-0.5, 0.5].map(|d| Point { value: at + d, optics });
     let nothing = Optics { opacity: 0.0, ..Optics::default() };
@@ -47,8 +47,8 @@ const GLOW_SIGMA: f64 = 3.0;
 const SLAB_SIGMA: f64 = 2.0;
 const SLAB_ALBEDO: f64 = 0.6;
 
-/// What a ray down the middle sees of the slab by light from the glowing cube, one scattering:
-/// the cube [-1/8, 1/8]^3 glows, the slab fills z from -1 to -1/2, and the ray runs at (x, 0).
+/// Radiance along a ray down into the slab, lit by the glowing cube, with one scattering:
+/// the cube [-1/8, 1/8]^3 glows, the slab fills z from -1 to -1/2, and the ray goes straight down at (x, 0).
 fn by_quadrature(x: f64, near: f64, far: f64) -> f64 {
     let gauss = gauss();
     let half = 0.125;
@@ -64,7 +64,7 @@ fn by_quadrature(x: f64, near: f64, far: f64) -> f64 {
                     let to = [0, 1, 2].map(|i| y[i] - position[i]);
                     let distance = to.iter().map(|d| d * d).sum::<f64>().sqrt();
                     let way = to.map(|d| d / distance);
-                    // Back from y towards the slab: out of the cube, then up through the slab.
+                    // From y away from the slab point: the distance to leave the cube, then the depth in the slab.
                     let leave = (0..3)
                         .map(|i| {
                             if way[i] == 0.0 {
@@ -113,7 +113,7 @@ fn a_glowing_block_lights_a_dark_slab() {
     }
 }
 
-/// Glowing matter that is cut away lights nothing.
+/// Glowing matter that is clipped away lights nothing.
 #[test]
 fn a_clipped_block_lights_nothing() {
     let value = |p: [usize; 3]| if p[2] < 4 { 2.0 } else { 1.0 };
@@ -123,13 +123,13 @@ fn a_clipped_block_lights_nothing() {
         let scene = Setup { clip, max_scatter: 1, ..setup }.scene();
         radiance(&scene, 10_000, |_| Ray::new(Vec3::new(0.1, 0.2, -3.0), Vec3::Z)).mean()
     };
-    // The cut leaves the dark quarter below z = -1/2 and not all of that.
+    // The clip leaves only part of the dark quarter below z = -1/2.
     let cut = ClipShape::Plane { point: Vec3::Z * -0.6, normal: Vec3::Z };
     assert!(seen(Vec::new()) > 0.01);
     assert_eq!(seen(vec![cut]), 0.0);
 }
 
-/// Light of matter and of lamps together is the sum of both alone.
+/// Light from glowing matter and from lights together is the sum of both alone.
 #[test]
 fn glow_and_lamps_add_up() {
     let value = |p: [usize; 3]| if p[2] < 8 { 2.0 } else { 1.0 };
@@ -146,15 +146,15 @@ fn glow_and_lamps_add_up() {
     ZTest::new(both.mean(), variance, glow.mean() + lamp.mean()).assert();
 }
 
-/// Where glowing and scattering matter are the same, a point may be lit by its own neighbourhood; the
-/// balance of both ways keeps that finite. In thermal balance inside an endless medium the radiance
-/// is Le everywhere: a thick block shows it, whatever its albedo.
+/// Where matter both glows and scatters, a point may be lit by its own neighbourhood; the balance heuristic
+/// over both sampling strategies keeps the estimate finite. In thermal equilibrium inside an infinite medium
+/// the radiance is Le everywhere: a thick block shows it, whatever its albedo.
 #[test]
 fn a_thick_glowing_block_is_a_black_body() {
     let glowing = Optics { emission: Rgb::splat(2.0), albedo: Rgb::splat(0.3), ..Optics::default() };
     let volume = blocks([16; 3], [2.0; 3], |_| 0.0);
     let setup = Setup::new(volume, vec![Point { value: 0.0, optics: glowing }], 60.0);
     let scene = setup.scene();
-    // Seen from its middle, a hundred free paths from any border.
+    // Seen from its middle, at least 60 mean free paths from any border.
     radiance(&scene, 2_000_000, |_| Ray::new(Vec3::ZERO, Vec3::X)).against(2.0).assert_within(3.0, 1e-3);
 }

@@ -1,4 +1,4 @@
-//! Light paths from every kind of light: their power into the box, and where they enter it.
+//! Light paths from every kind of light: the power they carry into the box, and where they enter it.
 
 use crate::scenes::mean;
 use std::f64::consts::PI;
@@ -11,7 +11,7 @@ use tyndall_testing::{ChiSquare, Mean};
 
 const UNIT: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// Unequal edges along the axes; turned; sheared and left-handed. All have the same middle.
+/// Boxes of unequal edges: axis-aligned; rotated; sheared and left-handed. All have the same centre.
 pub fn grids() -> [(&'static str, Grid); 3] {
     let (s, c) = 0.6_f64.sin_cos();
     let (p, q) = 0.9_f64.sin_cos();
@@ -45,18 +45,18 @@ fn silhouette(grid: &Grid, direction: Vec3) -> f64 {
 }
 
 fn hits(grid: &Grid, ray: &Ray) -> bool {
-    // Rounding may lead a ray past an edge.
+    // Rounding may make a ray miss an edge.
     let b = grid.index_bounds();
     let loose = Bounds::new(b.min - 1e-4, b.max + 1e-4);
     !loose.intersect(&grid.ray_to_index(ray)).is_empty()
 }
 
-/// What a path begins with.
+/// The random numbers that a light path starts with.
 pub fn uniforms(stream: &mut Stream) -> [f32; 4] {
     std::array::from_fn(|_| stream.uniform())
 }
 
-/// Power per unit of the light's colour, green.
+/// Power per unit of the light's colour, in the green channel.
 fn power(light: &Light, grid: &Grid, paths: u32) -> Mean {
     let box_ = Enclosure::new(grid);
     mean(3, paths, |_, stream| light.emit(&box_, uniforms(stream)).map_or(0.0, |e| f64::from(e.flux.g)))
@@ -98,7 +98,7 @@ fn points_fill_the_solid_angle_of_the_box() {
         for at in inside {
             near(power(&point(at), &grid, 100).mean(), 4.0 * PI, 1e-6);
         }
-        // From far the box is its silhouette, on both sides of where its rays become parallel.
+        // From far away only the silhouette counts: below and beyond the distance at which rays become parallel.
         for distance in [1e4, 1e6, 1.99e7, 2.3e7, 1e12] {
             let way = Vec3::new(0.5, 0.7, -0.3).normalize();
             let expected = silhouette(&grid, way) / f64::from(distance).powi(2);
@@ -109,7 +109,7 @@ fn points_fill_the_solid_angle_of_the_box() {
             );
         }
     }
-    // Above the middle of one face; [vanOosterom83] for four rectangles of a corner each.
+    // Above the centre of one face; [vanOosterom83] for the four rectangles from the centre to each corner.
     let size = straight.world_bounds().size().as_dvec3();
     for height in [1e-6, 1e-2, 1.0, 30.0] {
         let at = MIDDLE + Vec3::Z * (0.5 * size.z + height) as f32;
@@ -134,7 +134,7 @@ fn surfaces_inside_shine_whole() {
     assert_eq!(power(&around, &grid, 100).mean(), 0.0);
 }
 
-/// Beside a face, an edge and a corner, close to and far: the density is one over the flux, which is constant.
+/// Beside a face, an edge and a corner, near and far: the pdf is one over the flux, which is constant.
 #[test]
 fn directions_from_outside_are_uniform_over_the_box() {
     let positions = [[0.5, 0.4, 1.05], [-0.3, 0.2, 1.4], [1.3, -0.2, -0.6], [0.3, 1.6, 3.0]];
@@ -154,17 +154,17 @@ fn directions_from_outside_are_uniform_over_the_box() {
                 let ray = Ray::new(from, Vec3::from_array(w));
                 if hits(&grid, &ray) { 1.0 / f64::from(flux) } else { 0.0 }
             };
-            let test = ChiSquare { rows: 32, columns: 64, ..ChiSquare::of(3 * positions.len()) };
+            let test = ChiSquare { rows: 32, columns: 64, ..ChiSquare::among(3 * positions.len()) };
             let fit = test.directions(sample, pdf);
             assert!(fit.passes(), "{name}, from {position:?}: {fit}");
         }
     }
 }
 
-/// On faces, edges and corners, in their planes and lines, a hair away from them, and far off: paths start at finite
-/// positions with finite flux, and those from outside meet the box.
+/// Lights on faces, edges and corners, in their planes and lines, a hair away from them, and far away: paths start at
+/// finite positions with finite flux, and those of point lights outside hit the box.
 #[test]
-fn no_place_of_a_light_is_too_hard() {
+fn light_positions_that_are_hard_are_handled() {
     let mut started = 0;
     for (name, grid) in grids() {
         let box_ = Enclosure::new(&grid);
@@ -193,8 +193,8 @@ fn no_place_of_a_light_is_too_hard() {
     assert!(started > 6000, "{started}");
 }
 
-/// Just off a face's middle its diagonals cross, where both its triangles are almost flat; a light there sees half the
-/// sphere full of box, or counts as being on the border.
+/// A face's diagonals cross at its centre. Seen from just off it, both triangles of the face are almost flat: the box
+/// fills half the sphere of directions, or the light counts as being on the border.
 #[test]
 fn a_hair_above_a_face_is_on_it() {
     let grid = Grid::new([4; 3], [0.25; 3], UNIT, [-0.375, -0.375, 0.125], Space::Plain).unwrap();
@@ -205,7 +205,7 @@ fn a_hair_above_a_face_is_on_it() {
     }
 }
 
-/// A box so flat that the corners of its faces fall together in double precision.
+/// A box so flat that the corners of its faces coincide in double precision.
 #[test]
 fn no_box_is_too_flat() {
     let grid = Grid::new([1; 3], [1e-15, 1e15, 1.0], UNIT, [0.0; 3], Space::Plain).unwrap();
@@ -220,7 +220,7 @@ fn no_box_is_too_flat() {
     }
 }
 
-/// A silhouette of 1e44 square units under light of 1 has more power than single precision holds.
+/// A silhouette of 1e44 square units under an irradiance of 1 receives more power than single precision can represent.
 #[test]
 fn power_past_single_precision_is_not_sent() {
     let grid = Grid::new([1 << 24, 1 << 24, 1], [1e15; 3], UNIT, [0.0; 3], Space::Plain).unwrap();
@@ -229,7 +229,7 @@ fn power_past_single_precision_is_not_sent() {
     assert!(sun(Vec3::X).emit(&Enclosure::new(&grid), [0.5; 4]).is_some());
 }
 
-/// Rays start before the box, so that its first face is not behind them.
+/// Rays start outside the box, so that the face they enter is ahead of them.
 #[test]
 fn rays_enter_the_box_ahead() {
     for (name, grid) in grids() {
@@ -245,7 +245,7 @@ fn rays_enter_the_box_ahead() {
     }
 }
 
-/// Of each kind some, close, aside and inside, in one colour.
+/// Some of each kind, close to the box, aside and inside, in one colour.
 pub fn lights() -> Vec<(&'static str, Light)> {
     let color = Rgb::new(0.7, 2.0, 0.3);
     let texels = |i: usize| {
@@ -282,7 +282,7 @@ pub fn lights() -> Vec<(&'static str, Light)> {
     ]
 }
 
-/// The same kinds of lights in another colour, and each otherwise changed.
+/// Lights of each kind, in another colour, and with each other property changed.
 #[test]
 fn a_colour_changes_no_path_and_anything_else_does() {
     let at = Vec3::new(0.4, 2.3, -0.5);
@@ -298,7 +298,7 @@ fn a_colour_changes_no_path_and_anything_else_does() {
     let maps =
         |map: &Arc<Map>, up, turn| Light::Environment(Environment::map(Arc::clone(map), up, turn, true));
     let (red, white) = (Rgb::new(3.0, 0.0, 0.1), Rgb::WHITE);
-    // Per kind a light, the same in another colour, and others.
+    // For each kind a light, the same one in another colour, and different ones.
     let kinds = [
         [sun(-y, red, 5.0), sun(-y, white, 5.0), sun(-y, red, 5.1), sun(x - y, red, 5.0)].to_vec(),
         [point(at, red), point(at, white), point(at + x, red)].to_vec(),
@@ -343,5 +343,5 @@ fn a_colour_changes_no_path_and_anything_else_does() {
         assert_eq!([light.color(), recoloured.color()], expected);
     }
     let hidden = Light::Environment(Environment::constant(red, false));
-    assert!(sky(red).same_paths(&hidden), "what the camera sees is no path");
+    assert!(sky(red).same_paths(&hidden), "visibility to the camera does not affect light paths");
 }

@@ -1,4 +1,4 @@
-//! The fluence that light paths make inside the box, against that which light samples see there.
+//! The fluence inside the box as estimated by light paths and by light sampling.
 
 use crate::emit::{PROBE, grids, lights, uniforms};
 use crate::scenes::{Setup, mean};
@@ -10,7 +10,7 @@ use tyndall::transfer::{Optics, Point};
 use tyndall::volume::{Grid, Interpolation, ValueMap, Volume, Voxels};
 use tyndall_testing::{Mean, ZTest};
 
-/// What a path of flux 1 adds to the mean fluence: its length inside the probe over the probe's volume.
+/// What a path of flux 1 contributes to the mean fluence: its length inside the probe over the probe's volume.
 fn crossing(ray: &Ray) -> f64 {
     let (center, radius) = PROBE;
     let to_center = center - ray.origin;
@@ -21,7 +21,7 @@ fn crossing(ray: &Ray) -> f64 {
     if along > 0.0 { response(ray.direction) * 2.0 * f64::from(half_chord) / volume } else { 0.0 }
 }
 
-/// How well the probe sees light that travels in a direction: better from some sides, so that a path turned round shows.
+/// The probe's sensitivity to light travelling in a direction: not uniform, so that a reversed path is detected.
 fn response(travel: Vec3) -> f64 {
     1.0 + f64::from(travel.dot(Vec3::new(0.6, -0.48, 0.64)))
 }
@@ -32,21 +32,21 @@ fn place_in_the_probe(stream: &mut Stream) -> Vec3 {
     center + direction * (radius * stream.uniform().cbrt())
 }
 
-/// Mean fluence by light paths and by light samples: equal, both known to a percent.
+/// Asserts that the mean fluence by light paths equals that by light samples, both known to a percent.
 fn compare(name: &str, by_paths: Mean, by_samples: Mean) {
     let variance = by_paths.variance_of_mean() + by_samples.variance_of_mean();
     let test = ZTest::new(by_paths.mean(), variance, by_samples.mean());
     assert!(test.is_within(4.0, 1e-2), "{name}: {test}");
 }
 
-/// Path by path the mean fluence over a small sphere is that which [`Light::sample`] finds at its points.
+/// The mean fluence over a small sphere by light paths equals that which [`Light::sample`] gives at points inside it.
 #[test]
 fn paths_bring_the_fluence_that_samples_see() {
     const PATHS: u32 = 1 << 20;
     for (grid_name, grid) in grids() {
         let box_ = Enclosure::new(&grid);
         for (name, light) in lights() {
-            // Only a map has colours of its own.
+            // Only a map has colours that vary with direction.
             for channel in if name == "map" { 0..3 } else { 1..2 } {
                 let of = |rgb: Rgb| f64::from(rgb.to_array()[channel]);
                 let by_paths = mean(7, PATHS, |_, stream| {
@@ -89,7 +89,7 @@ fn glowing_matter_sends_all_its_power() {
                 let u = uniforms(stream);
                 emission.emit(medium, u, stream).map_or(0.0, |e| f64::from(e.flux.g))
             });
-            // To all sides: extinction 2 x 0.4, of which albedo leaves 0.7, and source radiance 3.
+            // In all directions: extinction 2 x 0.4, of which 1 - albedo = 0.7 absorbs, and source radiance 3.
             let expected = 4.0 * PI * 2.0 * 0.4 * 0.7 * 3.0 * volume;
             emitted.against(expected).assert_within(3.5, 2e-3);
         }

@@ -1,5 +1,5 @@
-//! White furnace: with albedo 1 in a uniform environment every pixel is the environment, whatever the
-//! shape, the density, the phase function and the position of the camera.
+//! White furnace: with albedo 1 in a uniform environment every pixel has the radiance of the environment, whatever
+//! the shape, the density, the phase function and the position of the camera.
 
 use crate::scenes::{Setup, henyey_greenstein, mean, radiance, volume};
 use tyndall::light::{Environment, Light};
@@ -66,7 +66,7 @@ fn lambert_surfaces() {
     }
 }
 
-/// Glossy surfaces may lose light between their facets, never make any.
+/// Glossy surfaces may lose light between their facets, but never create any.
 #[test]
 fn glossy_surfaces_make_no_light() {
     for seed in 0..4 {
@@ -76,12 +76,12 @@ fn glossy_surfaces_make_no_light() {
         let error = mean.variance_of_mean().sqrt();
         assert!(error < 2e-3, "noise {error}");
         assert!(mean.mean() < 1.0 + 4.0 * error, "{} +- {error}", mean.mean());
-        // Each of several reflections loses what falls between the facets, up to a third of it.
-        assert!(mean.mean() > 0.3, "{} is darker than facets explain", mean.mean());
+        // Each of several reflections loses the light that is trapped between facets, up to a third.
+        assert!(mean.mean() > 0.3, "{} is darker than losses between facets explain", mean.mean());
     }
 }
 
-/// The same with the sky found by two ways at once: lights that a ray can pass, chosen by power.
+/// The same with the sky split into two lights, chosen by power; an escaping ray hits both.
 #[test]
 fn several_lights_add_up() {
     let half = Light::Environment(Environment::constant(Rgb::splat(0.25), true));
@@ -90,8 +90,8 @@ fn several_lights_add_up() {
     seen(setup, 400_000).against(1.0).assert_within(3.5, 1e-3);
 }
 
-/// Absorbing matter is darker by exactly what it absorbs in each channel, and a channel of albedo 0
-/// ends in no other channel's death.
+/// Each channel of absorbing matter is darker by exactly what it absorbs, and a channel of albedo 0 does not end
+/// the path for the other channels.
 #[test]
 fn a_black_channel_does_not_end_the_walk() {
     let grey = |albedo: Rgb| {

@@ -1,4 +1,4 @@
-//! Every set of vector instructions gives the same picture, and the march the one that its definition says.
+//! Every vector instruction set gives the same picture, and ray marching gives the one that its definition predicts.
 
 use crate::scenes::{Setup, blocks, volume};
 use std::sync::Arc;
@@ -18,7 +18,7 @@ use tyndall::transfer::{Optics, Point};
 
 const MARCH: Settings = Settings { step: 0.5, light_samples: 3 };
 
-/// Glowing, reflecting and merely scattering matter between empty space, in 8^3 blocks and smaller.
+/// Glowing, reflecting and purely scattering matter with empty space between, in blocks of 9 x 7 x 11 voxels.
 fn scene(majorant_cell: usize) -> Scene {
     let value = |p: [usize; 3]| {
         let block = (p[0] / 9 + p[1] / 7 + p[2] / 11) % 4;
@@ -68,7 +68,7 @@ fn every_level_marches_to_the_same_picture() {
     }
 }
 
-/// The estimators of each level share no last bits but all else: means within their error.
+/// The estimators of the levels differ in rounding only: their means agree within the error.
 #[test]
 fn every_level_traces_to_the_same_mean() {
     let mean = |level| {
@@ -79,15 +79,15 @@ fn every_level_traces_to_the_same_mean() {
         (sum / n, variance.sqrt() / n)
     };
     let (scalar, error) = mean(Level::available()[0]);
-    assert!(error < 0.01 * scalar, "{error} of {scalar} tells nothing");
+    assert!(error < 0.01 * scalar, "an error of {error} at a mean of {scalar} is too large to compare");
     for level in Level::available() {
         let (found, _) = mean(level);
-        // Mostly the same paths, so that two errors of one picture are more than they may differ.
+        // Most paths are the same, so two standard errors of one picture are a generous bound.
         assert!((found - scalar).abs() < 2.0 * error, "{found}, scalar {scalar} +- {error}, with {level:?}");
     }
 }
 
-/// Cells that are empty are leapt over; with one cell around everything, which is not, no sample is left out.
+/// Empty cells are leapt over; a single cell around everything is not empty, so there no sample is skipped.
 #[test]
 fn leaping_over_what_is_empty_changes_no_bit() {
     for level in Level::available() {
@@ -102,7 +102,7 @@ fn leaping_over_what_is_empty_changes_no_bit() {
     }
 }
 
-/// Against the plain sum that the midpoint rule is.
+/// Compares with the plain sum of the midpoint rule.
 #[test]
 fn a_packet_marches_as_the_rule_says() {
     let scene = scene(8);
@@ -136,9 +136,9 @@ fn a_packet_marches_as_the_rule_says() {
     assert!(some > 20, "only {some} rays were partly covered");
 }
 
-/// A stop is honoured in the middle of one sample: here each takes up to a million scatterings.
+/// A deadline stops rendering even in the middle of a sample, which here takes up to a million scatterings.
 #[test]
-fn a_stop_takes_no_time() {
+fn a_deadline_stops_promptly() {
     let white = vec![Point { value: 0.0, optics: Optics { albedo: Rgb::WHITE, ..Optics::default() } }];
     let mut setup = Setup::new(blocks([4; 3], [2.0; 3], |_| 1.0), white, 900.0);
     setup.max_scatter = 1_000_000;
@@ -157,7 +157,7 @@ fn a_stop_takes_no_time() {
             let deadline = Instant::now() + Duration::from_millis(30);
             budget.deadline = Some(deadline);
             session.refine(&budget);
-            // Asked for are 5 ms; a machine that does other things gets some more.
+            // The goal is 5 ms; the rest allows for busy machines.
             let late = deadline.elapsed();
             assert!(late < Duration::from_millis(300), "{late:?} late with {method:?}");
         }

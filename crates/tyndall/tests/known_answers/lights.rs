@@ -22,7 +22,7 @@ fn lights_with_an_extent() -> Vec<(&'static str, Light)> {
     ]
 }
 
-/// Directions follow the density that [`Light::passed`] gives, which is also the sample's own.
+/// Sampled directions follow the pdf that [`Light::passed`] gives, which equals the pdf of the sample.
 #[test]
 fn directions_follow_their_density() {
     let from = Vec3::new(0.1, 0.0, 0.2);
@@ -39,12 +39,13 @@ fn directions_follow_their_density() {
         let pdf = |w: [f32; 3]| {
             light.passed(&Ray::new(from, Vec3::from_array(w))).map_or(0.0, |p| f64::from(p.pdf))
         };
-        let fit = ChiSquare { rows: 32, columns: 64, ..ChiSquare::of(lights.len()) }.directions(sample, pdf);
+        let fit =
+            ChiSquare { rows: 32, columns: 64, ..ChiSquare::among(lights.len()) }.directions(sample, pdf);
         assert!(fit.passes(), "{name}: {fit}");
     }
 }
 
-/// Irradiance of a surface at the origin that faces +z.
+/// Irradiance on a surface at the origin with this normal.
 fn irradiance(light: &Light, normal: Vec3, paths: u32) -> tyndall_testing::Mean {
     mean(5, paths, |_, s| {
         let sample = light.sample(Vec3::ZERO, [s.uniform(), s.uniform()]);
@@ -58,7 +59,7 @@ fn irradiances_have_closed_forms() {
     let check = |light: Light, expected: f64| {
         irradiance(&light, up, 1_000_000).against(expected).assert_within(3.5, 2e-3);
     };
-    // A facing disk: L pi r^2 / (r^2 + d^2). A sphere: L pi (r/d)^2 cos, whole above the horizon.
+    // A facing disk: L pi r^2 / (r^2 + d^2). A sphere entirely above the horizon: L pi (r/d)^2 cos.
     let d = 2.0;
     check(Light::Disk(Disk::new(up * d, -up, 1.5, Rgb::splat(3.0))), 3.0 * PI * 2.25 / (2.25 + 4.0));
     let middle = Vec3::new(2.0, 0.0, 2.0);
@@ -67,10 +68,10 @@ fn irradiances_have_closed_forms() {
     check(Light::Point(PointLight { position: middle, intensity: Rgb::splat(8.0) }), 0.5_f64.sqrt());
     let slanted = Vec3::new(1.0, 0.0, -1.0);
     check(Light::Directional(Directional::new(slanted, Rgb::splat(2.0), 0.0)), 2.0 * 0.5_f64.sqrt());
-    // A cone whole above the horizon gives the sharp light's irradiance, whatever its angle.
+    // A cone entirely above the horizon gives the irradiance of the sharp light, whatever its angle.
     check(Light::Directional(Directional::new(-up, Rgb::splat(2.0), 60.0)), 2.0);
     check(Light::Environment(Environment::constant(Rgb::splat(0.7), true)), 0.7 * PI);
-    // A facing square: 4 F of its corner quarter, F = 2/pi a/sqrt(1+a^2) atan(b/sqrt(1+a^2)) with a = b.
+    // A facing square: 4 F of one quarter of it, F = 2/pi a/sqrt(1+a^2) atan(b/sqrt(1+a^2)) with a = b.
     let a = 0.5_f64;
     let quarter = a / (1.0 + a * a).sqrt() * (a / (1.0 + a * a).sqrt()).atan() / PI;
     check(
@@ -93,9 +94,9 @@ fn dark_sides_stay_dark() {
     }
 }
 
-/// A bright texel is where the convention says: the middle column ahead, the right half to the right.
+/// A bright texel appears where the documentation says: the middle column ahead, the right half to the right.
 #[test]
-fn a_map_lies_as_documented() {
+fn a_map_is_oriented_as_documented() {
     let texel_at = |x: usize, y: usize| {
         let texels =
             (0..64 * 32).map(|i| if i == y * 64 + x { Rgb::splat(100.0) } else { Rgb::BLACK }).collect();

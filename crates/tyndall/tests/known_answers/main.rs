@@ -1,6 +1,6 @@
-//! The estimators against answers that are known without them: tables, closed forms, quadrature.
+//! The estimators against independently known answers: tables, closed forms, quadrature.
 //!
-//! Bugs that were planted to see these tests fail are listed in docs/planted-bugs.md.
+//! Bugs that were planted to check that these tests fail are listed in docs/planted-bugs.md.
 
 #![expect(
     clippy::cast_possible_truncation,

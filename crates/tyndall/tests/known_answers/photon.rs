@@ -1,6 +1,6 @@
-//! Photon mapping against closed forms, and against `path`, which has no bias.
+//! Photon mapping against closed forms, and against `path`, which is unbiased.
 //!
-//! Gathering blurs: in matter that changes little within the radius, and is thin across it, by less than a percent.
+//! Gathering blurs; the bias is below a percent in matter that varies little and is optically thin across the radius.
 
 use crate::scenes::{Setup, blocks, henyey_greenstein, matter, volume};
 use crate::seeds::{BLOCK, Estimate, PIXELS, estimate};
@@ -21,9 +21,9 @@ use tyndall::transfer::{Optics, Point};
 use tyndall::volume::{Grid, Space, ValueMap, Volume, Voxels};
 use tyndall_testing::Mean;
 
-/// Samples of each pixel of a `path` picture.
+/// Samples per pixel of a `path` picture.
 const SAMPLES: u32 = 32;
-/// Share by which blur may change the mean of a picture; blocks, which it mixes, twice as much in the mean square.
+/// Relative change that blur may cause in a picture's mean. The RMS change of blocks, which blur mixes, may be twice.
 const BIAS: f64 = 0.01;
 
 /// Settings of most tests.
@@ -59,7 +59,7 @@ fn of_32(value: impl Fn([f32; 3]) -> f32) -> impl Fn([usize; 3]) -> f32 {
     move |p| value(p.map(|i| (i as f32 + 0.5) / 16.0 - 1.0))
 }
 
-/// Opacity rises with the value from nothing at 0 to all at 1.
+/// Opacity rises with the value from zero at 0 to its full value at 1.
 fn ramp(optics: Optics) -> Vec<Point> {
     let clear = Point { value: 0.0, optics: Optics { opacity: 0.0, ..optics } };
     vec![clear, Point { value: 1.0, optics }]
@@ -69,14 +69,14 @@ fn sun() -> Light {
     Light::Directional(Directional::new(Vec3::new(0.3, 0.5, -1.0), Rgb::WHITE, 0.0))
 }
 
-/// The cloud in sunlight, of some albedo.
+/// The cloud in sunlight, with the given albedo.
 fn sunny(albedo: f32) -> Setup {
     let optics = Optics { albedo: Rgb::splat(albedo), ..Optics::default() };
     let volume = volume([32; 3], [2.0; 3], of_32(cloud));
     Setup { lights: vec![sun()], max_scatter: 20, ..Setup::new(volume, ramp(optics), 2.0) }
 }
 
-/// Seen by a parallel view towards a position.
+/// The scene seen by an orthographic camera looking at a position.
 fn seen(setup: Setup, from: Vec3, to: Vec3, height: f32) -> Scene {
     let mut scene = setup.scene();
     scene.camera = Camera::new(from, to, Vec3::Z, Lens::Orthographic { height });
@@ -96,11 +96,12 @@ fn assert_as_path_with(settings: PhotonSettings, name: &str, scene: &Scene) {
     photons(scene, settings).assert_near(&path(scene), BIAS, name);
 }
 
-/// A cube under a sun that shines straight down, seen along y: `albedo p E exp(-sigma (1 - z)) (1 - exp(-2 sigma))`; and
-/// from above.
+/// A cube under a sun that shines straight down, seen along y: `albedo p E exp(-sigma (1 - z)) (1 - exp(-2 sigma))`;
+/// also seen from above.
 #[test]
 fn single_scattering_in_a_cube() {
-    // Steps that all lie alike in the skin would add up what the few points of its kernel miss there, a percent.
+    // With coarser steps all rays would sample the cube's boundary layer at the same depths, and the error that the
+    // few points of the kernel make there would not average out: a percent.
     let fine = PhotonSettings { photons: 50_000, steps_per_voxel: 8.0, ..PHOTONS };
     let sigma = 0.8_f64;
     let albedo = Rgb::new(0.5, 1.0, 0.2);
@@ -136,7 +137,7 @@ fn single_scattering_in_a_cube() {
     }
 }
 
-/// With albedo 1 under an even sky all is as bright as the sky.
+/// With albedo 1 under a uniform sky every pixel is as bright as the sky.
 #[test]
 fn white_furnace() {
     let lumps =
@@ -156,7 +157,7 @@ fn white_furnace() {
     }
 }
 
-/// Light goes from surface to surface with the cosine of the side that it comes from.
+/// At surfaces, light is weighted by the cosine of the direction that it arrives from, on light paths too.
 #[test]
 fn surfaces() {
     let abc = Brdf::Abc(Abc::new(20.0, 1.2).unwrap());
@@ -185,7 +186,7 @@ fn lights_of_every_kind() {
         ("sun", sun()),
         ("wide sun", Light::Directional(Directional::new(-away, white, 40.0))),
         ("point", Light::Point(PointLight { position: away, intensity: white })),
-        // Beside the picture, where no ray comes near.
+        // Outside the picture, where no view ray comes near.
         ("point inside", Light::Point(PointLight { position: Vec3::new(0.95, 0.9, -0.9), intensity: white })),
         ("rect", Light::Rect(Rect::new(away, -away, Vec3::Z, [1.0, 0.5], white))),
         ("rect inside", Light::Rect(Rect::new(Vec3::Z * 0.9, -Vec3::Z, Vec3::X, [1.0, 0.5], white))),
@@ -203,7 +204,7 @@ fn lights_of_every_kind() {
     }
 }
 
-/// A channel that the light or the matter lacks takes nothing from the others, and lights add up.
+/// A channel that is black in the light or the matter does not affect the others, and lights add up.
 #[test]
 fn black_channels_and_several_lights() {
     let green = Optics { albedo: Rgb::new(0.0, 1.0, 0.6), ..Optics::default() };
@@ -218,17 +219,17 @@ fn black_channels_and_several_lights() {
     assert_as_path("two lights", &seen(setup, ASIDE, Vec3::ZERO, 1.6));
 }
 
-/// Each path has its share of the light, also one that misses: so many paths more change no mean.
+/// Each path carries its share of the light, even one that misses: more paths do not change the mean.
 #[test]
-fn the_number_of_photons_is_no_brightness() {
+fn brightness_does_not_depend_on_the_number_of_photons() {
     let setup = Setup { density: 0.3, ..sunny(0.9) };
     let scene = seen(setup, ASIDE, Vec3::ZERO, 1.6);
     let with = |count| photons(&scene, PhotonSettings { photons: count, ..PHOTONS });
-    // No power of two, and far from whole blocks of numbers that are stratified together.
+    // Not a power of two, and far from a multiple of the blocks in which numbers are stratified.
     with(200_001).assert_near(&with(1_000_000), BIAS, "photons");
 }
 
-/// From the nearest photons, and along the beam.
+/// The nearest-photon and beam estimates.
 #[test]
 fn the_other_estimates() {
     use photon::Estimate::{Beam, Nearest};
@@ -242,7 +243,7 @@ fn the_other_estimates() {
     }
 }
 
-/// Most gathers of thin matter may be left out: the same photons show the same picture.
+/// Most gathers in thin matter can be skipped: the same photons give the same picture.
 #[test]
 fn gathers_far_apart() {
     for estimate in [photon::Estimate::Point, photon::Estimate::Beam] {
@@ -260,7 +261,7 @@ fn gathers_far_apart() {
     }
 }
 
-/// A glowing ball lights a layer below it; the picture shows the layer alone.
+/// A glowing ball lights a layer below it; the picture shows only the layer.
 #[test]
 fn glowing_matter_lights_other_matter() {
     let value = |p: [f32; 3]| {
@@ -274,12 +275,12 @@ fn glowing_matter_lights_other_matter() {
     let points = [(-1.0, dark), (0.0, clear(dark)), (0.0, clear(glow)), (1.0, glow)];
     let points = points.map(|(value, optics)| Point { value, optics }).to_vec();
     let setup = Setup { max_scatter: 20, ..Setup::new(volume([32; 3], [2.0; 3], of_32(value)), points, 2.0) };
-    // Most of the light goes elsewhere.
+    // Many photons, because most of them miss the layer.
     let many = PhotonSettings { photons: 1_500_000, radius: 1.5, ..PHOTONS };
     assert_as_path_with(many, "glow", &seen(setup, Vec3::new(0.0, -5.0, -0.6), -Vec3::Z * 0.6, 0.7));
 }
 
-/// Voxels of unlike edges, turned, sheared and left-handed.
+/// Voxels of unequal edges, rotated, sheared and left-handed.
 #[test]
 fn grids_of_any_shape() {
     let (s, c) = (0.6, 0.8);
@@ -298,19 +299,19 @@ fn grids_of_any_shape() {
     assert_as_path("sheared", &seen(setup, ASIDE, Vec3::ZERO, 1.6));
 }
 
-/// The camera amid the matter, in front of a background that lights nothing.
+/// The camera is inside the matter, before a background that emits no light into the scene.
 #[test]
 fn a_camera_inside() {
     let mut scene = seen(sunny(0.8), ASIDE, Vec3::ZERO, 1.6);
     let lens = Lens::Perspective { fov: 80.0, aperture: 0.0, focus: 1.0 };
     scene.camera = Camera::new(Vec3::new(0.2, -0.6, 0.0), Vec3::new(0.0, 1.0, 0.2), Vec3::Z, lens);
     scene.background = Background::Color(Rgb::new(0.02, 0.0, 0.05));
-    // All rays pass the same few photons at first.
+    // Near the camera all rays pass the same few photons.
     let many = PhotonSettings { photons: 600_000, radius: 1.5, ..PHOTONS };
     assert_as_path_with(many, "inside", &scene);
 }
 
-/// Nothing lies, and no light goes lost, behind a cut.
+/// Behind a clip plane there is no matter, and no light is lost.
 #[test]
 fn a_cut_cloud() {
     let clip = vec![ClipShape::Plane { point: Vec3::ZERO, normal: Vec3::new(0.5, -1.0, 0.8) }];
@@ -323,9 +324,9 @@ fn voxels_without_interpolation() {
     assert_as_path("blocks", &seen(Setup { volume, ..sunny(0.8) }, ASIDE, Vec3::ZERO, 1.6));
 }
 
-/// A ball of four mean free paths to the radius, in fog two hundred times as thin. Gathers at the ball reach far beyond where
-/// light gets, and those in the fog beside it as far into the ball: the whole picture, and a ring about the ball where no ray
-/// meets it.
+/// A ball so dense that the gather radius is four mean free paths, in fog two hundred times as thin. Gathers at the
+/// ball reach far deeper than light does, and so do those in the fog beside it. Checks the whole picture, and the fog
+/// beside the ball where no ray hits it.
 #[test]
 fn a_dense_ball_in_fog() {
     let ball = |p: [f32; 3]| if Vec3::from_array(p).length() < 0.5 { 1.0 } else { 0.0 };
@@ -343,12 +344,12 @@ fn a_dense_ball_in_fog() {
     let around = seen(setup(), -Vec3::Y * 5.0, Vec3::ZERO, 1.6);
     let beside = Vec3::X * 0.56;
     let beside = seen(setup(), beside - Vec3::Y * 5.0, beside, 0.09);
-    // Of the steps of its voxels the gathers see less than there is.
+    // At the voxel steps of the ball's surface, gathers see less light than there is.
     photons(&around, settings).assert_within(&path(&around), [0.02, 0.12], "ball");
     photons(&beside, settings).assert_within(&path(&beside), [0.04, 0.05], "fog beside it");
 }
 
-/// Later passes gather more narrowly, by photons of their own: blur and noise both decrease.
+/// Later passes gather within a smaller radius, with new photons: blur and noise both decrease.
 #[test]
 fn refinement_converges() {
     const PASSES: u32 = 16;
@@ -358,7 +359,7 @@ fn refinement_converges() {
     let (exact, first, last) = (path(&scene), after(1), after(PASSES));
     let noise = |of: &Estimate| of.blocks.iter().map(Mean::variance_of_mean).sum::<f64>();
     let off = [first.blocks_off(&exact, 1), last.blocks_off(&exact, 1)];
-    assert!(off[0] > 0.02 && off[1] < 0.85 * off[0], "blocks off by {off:?} after one pass and the last");
+    assert!(off[0] > 0.02 && off[1] < 0.85 * off[0], "blocks off by {off:?} after first and last pass");
     assert!(noise(&last) < noise(&first) / 8.0, "noise {} after {}", noise(&last), noise(&first));
     last.assert_near(&exact, 2.0 * BIAS, "refined");
 }

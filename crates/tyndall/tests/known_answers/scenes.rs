@@ -17,7 +17,7 @@ use tyndall::transfer::{Optics, Point, TransferFunction};
 use tyndall::volume::{Grid, Interpolation, ValueMap, Volume, Voxels};
 use tyndall_testing::Mean;
 
-/// Matter by value, lights, and what else a scene needs.
+/// A volume, the matter of its values, lights, and the other parts of a scene.
 pub struct Setup {
     pub volume: Volume,
     pub points: Vec<Point>,
@@ -75,7 +75,7 @@ impl Setup {
     }
 }
 
-/// A volume of given values, in a box of given size around the origin.
+/// A volume with the given values, in a box of the given size around the origin.
 pub fn volume(dims: [usize; 3], size: [f64; 3], values: impl Fn([usize; 3]) -> f32) -> Volume {
     let grid = Grid::centred(dims, [0, 1, 2].map(|a| size[a] / dims[a] as f64)).unwrap();
     let [nx, ny, _] = dims;
@@ -83,17 +83,17 @@ pub fn volume(dims: [usize; 3], size: [f64; 3], values: impl Fn([usize; 3]) -> f
     Volume::new(grid, Voxels::F32(data), ValueMap::IDENTITY).unwrap()
 }
 
-/// The same, read without interpolation.
+/// The same, without interpolation.
 pub fn blocks(dims: [usize; 3], size: [f64; 3], values: impl Fn([usize; 3]) -> f32) -> Volume {
     volume(dims, size, values).with_interpolation(Interpolation::Nearest)
 }
 
-/// Opaque matter of an albedo, whatever the value.
+/// Matter of full opacity and one albedo at every value.
 pub fn matter(albedo: f32) -> Vec<Point> {
     vec![Point { value: 0.0, optics: Optics { albedo: Rgb::splat(albedo), ..Optics::default() } }]
 }
 
-/// A slab of unit thickness from z = -1/2 to 1/2, so wide that nobody finds its sides.
+/// A slab of unit thickness from z = -1/2 to 1/2, so wide that no path reaches its sides.
 pub fn slab(optical_thickness: f32, albedo: f32, phase: Phase) -> Setup {
     let wide = 1e5;
     let volume = volume([1, 1, 1], [wide, wide, 1.0], |_| 0.0);
@@ -104,15 +104,15 @@ pub fn henyey_greenstein(g: f32) -> Phase {
     if g == 0.0 { Phase::Isotropic } else { Phase::HenyeyGreenstein(HenyeyGreenstein::new(g).unwrap()) }
 }
 
-/// Paths per parallel piece; the pieces are merged in order, so that the threads leave no trace.
+/// Paths per parallel piece; the pieces are merged in order, so that the result does not depend on the threads.
 const PIECE: u32 = 4096;
 
-/// The mean of what `sample` makes of independent paths: it gets the path's numbers and a stream of others.
+/// The mean of `sample` over independent paths: it gets the path's random numbers and a separate stream of others.
 pub fn mean(seed: u64, paths: u32, sample: impl Fn(&mut PathSampler, &mut Stream) -> f64 + Sync) -> Mean {
     let piece = |i: u32| {
         let mut mean = Mean::default();
         for path in i * PIECE..((i + 1) * PIECE).min(paths) {
-            // A pixel of its own for each path: its numbers are independent of the others'.
+            // Each path has its own pixel, so its numbers are independent of the others'.
             let mut numbers = PathSampler::new(seed, path, 0);
             mean.push(sample(&mut numbers, &mut Stream::new(seed, [path, 0, 77])));
         }
@@ -125,7 +125,7 @@ pub fn mean(seed: u64, paths: u32, sample: impl Fn(&mut PathSampler, &mut Stream
     })
 }
 
-/// Mean radiance (green) along rays that `ray` draws.
+/// Mean radiance (green) along rays that `ray` samples.
 pub fn radiance(scene: &Scene, paths: u32, ray: impl Fn(&mut Stream) -> Ray + Sync) -> Mean {
     mean(scene.render.seed, paths, |numbers, stream| f64::from(trace(scene, ray(stream), numbers).radiance.g))
 }

@@ -1,5 +1,5 @@
-//! Pictures of several seeds, compared as a whole and by blocks: where pixels share their photons, what is certain of a picture is
-//! told by pictures of other seeds, never by its own variance.
+//! Pictures of several seeds, compared as a whole and by blocks: where pixels share photons, the uncertainty of a
+//! picture can be estimated only from pictures of other seeds, not from its own variance.
 
 use std::sync::{Arc, LazyLock};
 use tyndall::film::Image;
@@ -7,19 +7,19 @@ use tyndall::scene::{MethodChoice, Scene};
 use tyndall::session::{Budget, Session};
 use tyndall_testing::Mean;
 
-/// Pictures of each estimate.
+/// Number of pictures per estimate.
 const SEEDS: u64 = 8;
-/// Pixels along an edge of the picture, and of the blocks that are compared.
+/// Edge length in pixels of the picture, and of the blocks that are compared.
 pub const PIXELS: usize = 32;
 pub const BLOCK: usize = 8;
 
-/// A picture's mean and those of its blocks, each the mean over seeds; the channels follow each other.
+/// A picture's mean and the means of its blocks, each averaged over seeds; the channels are interleaved.
 pub struct Estimate {
     pub whole: Vec<Mean>,
     pub blocks: Vec<Mean>,
 }
 
-/// Means of square blocks of pixels of an edge; the channels follow each other.
+/// Means of blocks of `edge` x `edge` pixels; the channels are interleaved.
 fn block_means(image: &Image, edge: usize) -> Vec<f64> {
     let row = PIXELS / edge;
     let mut means = vec![0.0; 3 * row * row];
@@ -32,7 +32,7 @@ fn block_means(image: &Image, edge: usize) -> Vec<f64> {
     means
 }
 
-/// Of a scene by a method, with so many samples of each pixel.
+/// Renders a scene by a method, with `samples` per pixel, for all seeds.
 pub fn estimate(scene: &Scene, method: &MethodChoice, samples: u32) -> Estimate {
     static POOL: LazyLock<Arc<rayon::ThreadPool>> =
         LazyLock::new(|| Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap()));
@@ -54,7 +54,7 @@ pub fn estimate(scene: &Scene, method: &MethodChoice, samples: u32) -> Estimate 
 }
 
 impl Estimate {
-    /// What is known for certain, of every block by its column and row.
+    /// Exact values, given for every block by its column and row.
     pub fn exactly(blocks: impl Fn([usize; 2]) -> [f64; 3]) -> Self {
         let row = PIXELS / BLOCK;
         let values: Vec<f64> = (0..row * row).flat_map(|i| blocks([i % row, i / row])).collect();
@@ -65,7 +65,7 @@ impl Estimate {
         Self { whole: [0, 1, 2].map(whole).to_vec(), blocks: values.into_iter().map(certain).collect() }
     }
 
-    /// Root of the mean square by which blocks of a channel are off beside noise, over the channel's mean.
+    /// RMS error of a channel's blocks beyond noise, relative to the channel's mean.
     pub fn blocks_off(&self, expected: &Self, channel: usize) -> f64 {
         let pairs = || self.blocks.iter().zip(&expected.blocks).skip(channel).step_by(3);
         let square = |(a, b): (&Mean, &Mean)| {
@@ -75,13 +75,13 @@ impl Estimate {
         mean.max(0.0).sqrt() / expected.whole[channel].mean()
     }
 
-    /// Sharp, and off by no more than so large a share.
+    /// Asserts low noise and relative errors of at most `bias` (whole picture) and twice `bias` (RMS of blocks).
     #[track_caller]
     pub fn assert_near(&self, expected: &Self, bias: f64, name: &str) {
         self.assert_within(expected, [bias, 2.0 * bias], name);
     }
 
-    /// Sharp, and off by no more than so large a share as a whole, and in the mean square of blocks.
+    /// Asserts low noise and relative errors of at most `bias` (whole picture) and `of_blocks` (RMS of blocks).
     #[track_caller]
     pub fn assert_within(&self, expected: &Self, [bias, of_blocks]: [f64; 2], name: &str) {
         for channel in 0..3 {

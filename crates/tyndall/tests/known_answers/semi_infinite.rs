@@ -1,11 +1,11 @@
-//! The semi-infinite isotropic medium \[Chandrasekhar60\], as radiances.
+//! Radiances reflected by a semi-infinite, isotropically scattering medium \[Chandrasekhar60\].
 
 use crate::scenes::{henyey_greenstein, radiance, slab};
 use std::f64::consts::PI;
 use tyndall::light::{Directional, Light};
 use tyndall::math::{Ray, Rgb, Vec3};
 
-/// Cosines of incidence and view, and the H functions there.
+/// Cosines of incidence and view, at which the H function is tabulated.
 const MU: [f64; 3] = [0.1, 0.5, 1.0];
 
 fn assert_reflection(albedo: f32, thickness: f32, h: [f64; 3], paths: u32) {
@@ -13,7 +13,7 @@ fn assert_reflection(albedo: f32, thickness: f32, h: [f64; 3], paths: u32) {
         let (mu_in, mu_out) = (MU[i], MU[j]);
         let mut reflection = f64::from(albedo) / 4.0 * h[i] * h[j] / (mu_in + mu_out);
         if albedo == 1.0 {
-            // A conservative slab of thickness b lets through what an endless one would return
+            // A conservative slab of thickness b transmits what a semi-infinite one would return
             // [vandeHulst80, sec. 5.3.2]: T = 4/3 K(mu) K(mu0) / (b + 2 q), K = sqrt(3)/4 H.
             let k = |h: f64| 0.75_f64.sqrt() / 2.0 * h;
             reflection -= 4.0 / 3.0 * k(h[i]) * k(h[j]) / (f64::from(thickness) + 2.0 * 0.710_446);

@@ -1,4 +1,4 @@
-//! Single scattering in a slab by its closed form: `raymarch`, and `path` with one scattering.
+//! Single scattering in a slab against its closed form: `raymarch`, and `path` with one scattering.
 
 use crate::scenes::{Setup, henyey_greenstein, matter, radiance, slab, volume};
 use std::f64::consts::PI;
@@ -56,10 +56,10 @@ fn path_with_one_scattering() {
 }
 
 /// The error of the midpoint rule falls with the square of the step. The slab is one voxel thick, so a
-/// step of 1/64 is some hundredths of optical thickness.
+/// step of 1/64 is a few hundredths of optical thickness.
 #[test]
 fn raymarch_and_the_order_of_its_step_error() {
-    // The slab's voxel is wide: steps count in its cube root.
+    // Steps are in units of the cube root of the voxel's volume, which is large for this wide slab.
     let voxel = 1e5_f64.powf(2.0 / 3.0);
     for case in &CASES {
         let scene = case.scene();
@@ -72,13 +72,13 @@ fn raymarch_and_the_order_of_its_step_error() {
             f64::from(march.march(&scene, &case.ray()).radiance.g) / case.expected() - 1.0
         };
         let (coarse, fine) = (error(32.0), error(256.0));
-        // 8 times finer: about 64 times nearer, and single precision adds some last places.
+        // 8 times finer steps: about 64 times less error, plus single-precision rounding.
         assert!(fine.abs() < coarse.abs() / 30.0 + 2e-5, "error {coarse:e} at 1/32, {fine:e} at 1/256");
         assert!(coarse.abs() < 0.02 && coarse.abs() > 1e-6, "error {coarse:e} at 1/32");
     }
 }
 
-/// One scattering of every light that has an extent or stands in the matter, by both methods.
+/// Single scattering from every light that has an extent or is inside the matter, by both methods.
 #[test]
 fn both_methods_agree_under_every_light() {
     let at = Vec3::new(0.3, 0.4, 0.2);

@@ -8,8 +8,8 @@ use tyndall::math::{Ray, Rgb, Vec3};
 use tyndall::sampling::{Stream, warp};
 use tyndall::scene::Scene;
 
-/// A ray to the slab from above (`side` = 1) or below (-1), its direction distributed as the cosine,
-/// so that pi times the mean radiance is the flux that leaves there.
+/// A ray towards the slab from above (`side` = 1) or below (-1), with a cosine-weighted direction,
+/// so that pi times the mean radiance is the flux that leaves the slab on that side.
 fn towards_slab(side: f32) -> impl Fn(&mut Stream) -> Ray + Sync {
     move |stream| {
         let out = warp::cosine_hemisphere([stream.uniform(), stream.uniform()]);
@@ -21,7 +21,7 @@ fn towards_slab(side: f32) -> impl Fn(&mut Stream) -> Ray + Sync {
 /// Flux through a side, per incident flux.
 fn assert_flux(scene: &Scene, side: f32, incident: f64, unscattered: f64, expected: f64, paths: u32) {
     let flux = radiance(scene, paths, towards_slab(side));
-    // The test is of all light that leaves, but the noise is that of the scattered part alone.
+    // `expected` covers all light that leaves, but only the scattered part is estimated.
     let scattered = (expected - unscattered) * incident / PI;
     flux.against(scattered).assert_within(3.0, 1e-3);
 }
@@ -31,7 +31,7 @@ fn beam(albedo: f32, g: f32, thickness: f32, reflected: f64, transmitted: f64, p
     setup.lights = vec![Light::Directional(Directional::new(-Vec3::Z, Rgb::WHITE, 0.0))];
     let scene = setup.scene();
     assert_flux(&scene, 1.0, 1.0, 0.0, reflected, paths);
-    // The sharp beam itself is not seen: only what was scattered.
+    // The unscattered beam itself is not seen, only scattered light.
     assert_flux(&scene, -1.0, 1.0, (-f64::from(thickness)).exp(), transmitted, paths);
 }
 
@@ -70,7 +70,7 @@ fn adding_doubling_diffuse() {
     setup.lights = vec![Light::Environment(Environment::map(map, Vec3::Z, 0.0, false))];
     let scene = setup.scene();
     assert_flux(&scene, 1.0, PI, 0.0, 0.47319, 2_000_000);
-    // What was not scattered, 2 E3(4), is not seen either: the map is invisible.
+    // Unscattered light, 2 E3(4), is not seen either: the map is invisible.
     let unscattered = tyndall_testing::quadrature::integrate(|mu| 2.0 * mu * (-4.0 / mu).exp(), [1e-9, 1.0]);
     assert_flux(&scene, -1.0, PI, unscattered, 0.09056, 6_000_000);
 }

@@ -1,4 +1,4 @@
-//! The same bits on any number of threads, however the work is sliced.
+//! The same bits for any number of threads, however the work is split in time.
 
 use crate::photon::PHOTONS;
 use crate::scenes::{Setup, volume};
@@ -40,7 +40,7 @@ fn picture(scene: &Scene, threads: usize, slice: Option<Duration>) -> Image {
     while session.film().samples() < 5 {
         budget.deadline = slice.map(|slice| Instant::now() + slice);
         let done = session.refine(&budget);
-        assert!(done.mean_samples <= 5.0, "{} samples: a tile went past the others' end", done.mean_samples);
+        assert!(done.mean_samples <= 5.0, "{} samples: a tile exceeds the budget", done.mean_samples);
     }
     session.image()
 }
@@ -48,7 +48,7 @@ fn picture(scene: &Scene, threads: usize, slice: Option<Duration>) -> Image {
 #[test]
 fn threads_and_slices_leave_no_trace() {
     let march = |step| RayMarch::choose(Settings { step, light_samples: 4 });
-    // Without scattering a march stops between samples, of which it then takes many.
+    // Without scattering a march is interrupted only between its steps, of which the small step gives many.
     let photons = PhotonMapper::choose(PhotonSettings { photons: 20_000, segments: 5, ..PHOTONS });
     let all = METHODS.iter().map(|method| (method.draft(&method.default_settings()), 8));
     for (choice, max_scatter) in all.chain([(march(0.5), 8), (march(0.01), 0), (photons, 8)]) {
@@ -62,6 +62,6 @@ fn threads_and_slices_leave_no_trace() {
         assert_eq!(one, picture(&scene, 2, Some(Duration::from_micros(300))));
         let mut other = scene.clone();
         other.render.seed += 1;
-        assert_eq!(has_noise, one != picture(&other, 2, None), "only what has noise has a seed");
+        assert_eq!(has_noise, one != picture(&other, 2, None), "only methods with noise depend on the seed");
     }
 }

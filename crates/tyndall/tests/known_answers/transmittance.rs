@@ -16,7 +16,7 @@ fn ramp() -> Vec<Point> {
         .to_vec()
 }
 
-/// `exp(-integral)` of the trilinear field along a ray, by steps much finer than its kinks.
+/// `exp(-integral)` of the trilinear field along a ray, by steps much finer than the spacing of its kinks.
 fn exact(medium: &Medium, ray: &Ray, upto: f32) -> f64 {
     let track = medium.track(ray, upto);
     let n = 200_000;
@@ -45,7 +45,7 @@ fn constant_density() {
     assert_agree(&scene, &ray, (-0.5 * 1.5 * 4.0_f64).exp());
 }
 
-/// Even and dense in many cells: the control alone gets past the depth from which it lives on by chance.
+/// Uniform and dense in many cells: the control's optical depth alone reaches the threshold of Russian roulette.
 #[test]
 fn constant_density_in_many_cells() {
     let scene = Setup::new(volume([6, 6, 64], [1.0, 1.0, 4.0], |_| 1.0), ramp(), 1.0).scene();
@@ -63,7 +63,7 @@ fn linear_density_along_every_axis_and_aslant() {
         from[axis] = 5.0;
         let mut direction = Vec3::ZERO;
         direction[axis] = -1.0;
-        // Clamped in the outer half voxels, which leaves the integral as it is.
+        // The field is clamped in the outer half voxels, which does not change the integral.
         assert_agree(&scene, &Ray::new(from, direction), (-2.0_f64).exp());
         let aslant = Ray::new(Vec3::new(-3.0, -2.0, -2.5), Vec3::new(1.0, 0.7, 0.9).normalize());
         assert_agree(&scene, &aslant, exact(&scene.medium, &aslant, f32::INFINITY));
@@ -95,7 +95,7 @@ fn gaussian_density() {
     }
 }
 
-/// Where flights end, not only whether they do.
+/// Tests where flights end, not only whether they do.
 #[test]
 fn collisions_are_distributed_as_the_optical_depth_says() {
     let scene = gaussian();
@@ -103,7 +103,7 @@ fn collisions_are_distributed_as_the_optical_depth_says() {
     let ray = Ray::new(Vec3::new(0.03, 0.0, 2.0), Vec3::new(0.02, 0.05, -1.0).normalize());
     let track = medium.track(&ray, f32::INFINITY);
     let through = exact(medium, &ray, f32::INFINITY);
-    // Optical depth at even steps, for a distribution function that costs nothing.
+    // Optical depth tabulated at equal steps, so that the distribution function is cheap.
     let n = 20_000;
     let dt = f64::from(track.length()) / f64::from(n);
     let mut depths = vec![0.0_f64];
@@ -124,14 +124,14 @@ fn collisions_are_distributed_as_the_optical_depth_says() {
     ChiSquare::default().against_cdf(flights, cdf, 200).assert();
 }
 
-/// Distances by inverting a march are distributed as the march says, and each collision tells the density of its distance.
+/// Distances sampled by inverting a march follow its distribution, and each collision reports the pdf of its distance.
 #[test]
-fn marched_distances_have_the_density_that_they_tell() {
+fn marched_distances_have_the_density_that_they_report() {
     let scene = gaussian();
     let medium = &*scene.medium;
     let ray = Ray::new(Vec3::new(0.03, 0.0, 2.0), Vec3::new(0.02, 0.05, -1.0).normalize());
     let track = medium.track(&ray, f32::INFINITY);
-    // So coarse that the march is far from the truth; the last step is not whole.
+    // So coarse that the march is far from the exact integral; the last step is a partial one.
     let step = track.length() / 13.7;
     let borders: Vec<f32> = (0..=14_u8).map(|k| (f32::from(k) * step).min(track.length())).collect();
     let mut depths = vec![0.0_f64];
@@ -154,7 +154,7 @@ fn marched_distances_have_the_density_that_they_tell() {
         passed += i32::from(collision.is_none());
         let collision = collision?;
         let t = f64::from(collision.t);
-        // The slope of the distribution function, away from the borders of steps.
+        // The slope of the distribution function, away from step boundaries.
         let around = [t - 1e-3 * f64::from(step), t + 1e-3 * f64::from(step)];
         if around.map(|t| (t / f64::from(step)) as usize)[0]
             == around.map(|t| (t / f64::from(step)) as usize)[1]
@@ -193,16 +193,16 @@ fn what_is_clipped_is_vacuum() {
     setup.clip =
         vec![ClipShape::Plane { point: Vec3::new(0.0, 0.0, 0.25), normal: Vec3::new(0.0, 1.0, 1.0) }];
     let scene = setup.scene();
-    // Down the middle: from z = 1 to 1/4 is cut, down to -1 is left.
+    // Down the middle: z from 1 to 1/4 is clipped, and from 1/4 to -1 is left.
     assert_agree(&scene, &Ray::new(Vec3::Z * 7.0, -Vec3::Z), (-1.25_f64).exp());
-    // At y = 1/4 the cut reaches down to z = 0.
+    // At y = 1/4 the clipped part reaches down to z = 0.
     assert_agree(&scene, &Ray::new(Vec3::new(0.0, 0.25, 7.0), -Vec3::Z), (-1.0_f64).exp());
-    // From inside the cut part upwards there is nothing.
+    // Upwards from inside the clipped part there is nothing.
     let up = scene.medium.track(&Ray::new(Vec3::new(0.0, 0.0, 0.5), Vec3::Z), f32::INFINITY);
     assert_eq!(up.length(), 0.0);
 }
 
-/// Light that passes close by something dense meets many tentative collisions and none of them is real.
+/// A ray close to something dense has many tentative collisions, none of which is real.
 #[test]
 fn thousands_of_tentative_collisions_take_nothing() {
     let spike = volume([9; 3], [9.0; 3], |p| if p == [0; 3] { 1.0 } else { 0.0 });
@@ -214,7 +214,7 @@ fn thousands_of_tentative_collisions_take_nothing() {
     }
 }
 
-/// Skipping empty cells changes no bit: marching with cells equals marching with one cell around all.
+/// Skipping empty cells changes nothing: marching with cells equals marching with one cell around everything.
 #[test]
 fn skipping_changes_nothing() {
     let n = 50;
@@ -229,7 +229,7 @@ fn skipping_changes_nothing() {
         let mut point = || Vec3::new(s.uniform() - 0.5, s.uniform() - 0.5, s.uniform() - 0.5);
         let (from, to) = (point().normalize() * 4.0, point());
         let ray = Ray::new(from, (to - from).normalize());
-        // The long step is longer than the margin of a voxel that every cell knows of its neighbours.
+        // The long step exceeds the one-voxel margin of its neighbours that every cell includes.
         for step in [0.013, 0.11] {
             let thickness = |scene: &Scene| {
                 let track = scene.medium.track(&ray, f32::INFINITY);

@@ -99,7 +99,7 @@ impl Shape {
 
 impl World {
     /// Converts a vector of the file to our world; missing components are zero.
-    fn to_world(&self, vector: &[f64]) -> Option<Vector> {
+    fn to_world(self, vector: &[f64]) -> Option<Vector> {
         (vector.len() == self.dimension)
             .then(|| std::array::from_fn(|i| self.signs[i] * vector.get(i).copied().unwrap_or(0.0)))
     }

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::super::*;
 use super::{nested, point, scene};
 
-/// The example of the interface, with every kind of light, clip and camera that this version has.
+/// A complete example, with every kind of light and clip that this version has.
 const EXAMPLE: &str = r#"
 version = 1
 
@@ -98,7 +98,7 @@ max = [1, 1, 1]
 "#;
 
 #[test]
-fn the_example_of_the_interface_is_read() {
+fn the_complete_example_is_read() {
     let document = Document::from_toml(EXAMPLE).unwrap();
     assert_eq!(document.volume.raw.as_ref().unwrap().dims, [256; 3]);
     let points = document.transfer_function.as_ref().unwrap().points.as_ref().unwrap();
@@ -249,7 +249,7 @@ fn the_ends_of_the_ranges_are_accepted() {
     }
 }
 
-/// Rays stood still in matter of minus no density.
+/// A density of -0 once stopped rays from advancing.
 #[test]
 fn a_zero_has_no_sign() {
     for density in ["-0.0", "-0", "-1e-300", "-1e-46"] {
@@ -267,7 +267,7 @@ fn a_zero_has_no_sign() {
 
 #[test]
 fn the_check_and_the_types_agree() {
-    // A value that the check passes must be one that the types read: the message of serde means that they differ.
+    // Every value that passes the check must deserialize into the types: serde's message means that the two disagree.
     let text = EXAMPLE.replace("\"isotropic\"", "\"schlick\"").replace("\"lambert\"", "\"abc\"");
     let value = Document::from_toml(&text).unwrap().to_value();
     let mut leaves = Vec::new();
@@ -317,7 +317,7 @@ fn the_manual_names_every_key_and_every_word() {
     collect_words(&schema(), &mut words);
     assert!(words.len() > 60, "{words:?}");
     for word in words {
-        assert!(manual.contains(&format!("`{word}`")), "docs/scene.md does not tell of `{word}`");
+        assert!(manual.contains(&format!("`{word}`")), "docs/scene.md does not mention `{word}`");
     }
 }
 

@@ -1,4 +1,4 @@
-//! The document as users meet it.
+//! Tests of the document as users write it.
 
 mod accepted;
 mod refused;
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::{Document, DocumentError, apply};
 
-/// A small sound document, changed by a merge patch.
+/// A small valid document, changed by a merge patch.
 fn scene(patch: &Value) -> Result<Document, DocumentError> {
     Document::from_value(apply(&json!({ "volume": { "path": "head.nrrd" } }), patch))
 }

@@ -1,4 +1,4 @@
-//! What is refused, where, and with which mend.
+//! What is refused, at which path, and with which advice.
 
 use std::ops::RangeInclusive;
 
@@ -8,7 +8,7 @@ use super::super::{Document, apply};
 use super::{nested, point, scene};
 use tyndall::sampling::{BOUNCES, PATHS, PIXELS};
 
-/// Asserts that a patch makes a document wrong at `path`, alone, and returns the message.
+/// Asserts that a patch makes the document wrong at `path` and nowhere else, and returns the message.
 fn refused(patch: &Value, path: &str) -> String {
     let error = scene(patch).expect_err(&patch.to_string());
     assert_eq!(error.path(), path, "{error}");
@@ -16,7 +16,7 @@ fn refused(patch: &Value, path: &str) -> String {
     error.to_string()
 }
 
-/// Asserts that `values` put at the dotted `path` are refused there.
+/// Asserts that each of `values` is refused at the dotted `path`.
 fn refused_values(path: &str, values: impl IntoIterator<Item = Value>) {
     for value in values {
         refused(&nested(path, value), path);
@@ -53,7 +53,7 @@ fn an_unknown_word_suggests_the_nearest() {
 }
 
 #[test]
-fn what_comes_with_later_versions_says_so() {
+fn what_comes_with_later_versions_is_reported_as_such() {
     for path in ["objects", "surfaces", "render.many_light", "render.irradiance_cache", "render.refractive"] {
         let message = refused(&nested(path, json!({})), path);
         assert!(message.contains(&format!("does not have `{path}` yet")), "{message}");
@@ -65,7 +65,7 @@ fn what_comes_with_later_versions_says_so() {
 }
 
 #[test]
-fn what_must_be_there_is_missed() {
+fn a_missing_required_key_is_an_error() {
     let missing = |value: Value, path: &str| {
         let error = Document::from_value(value).unwrap_err();
         assert_eq!(error.path(), path, "{error}");
@@ -123,13 +123,13 @@ fn wrong_types_are_refused() {
     refused_values("film.background", [json!("black"), json!([1, 1]), json!(true)]);
     refused_values("transfer_function.points", [json!([]), json!({})]);
     let error = Document::from_json("[]").unwrap_err();
-    assert_eq!(error.to_string(), "the document: found a list of 0, expected a table");
+    assert_eq!(error.to_string(), "the document: found a list of length 0, expected a table");
     let error = Document::from_value(json!({ "volume": { "path": "a" }, "camera": null })).unwrap_err();
     assert!(error.to_string().contains("leave the key out"), "{error}");
 }
 
 #[test]
-fn what_has_no_random_numbers_of_its_own_is_refused() {
+fn more_than_the_random_numbers_can_address_is_refused() {
     let too_many = |numbers: RangeInclusive<u32>| numbers.end() + 2;
     refused_values("film.size", [json!([too_many(PIXELS), 1])]);
     refused_values("render.photon.photons", [json!(too_many(PATHS))]);
@@ -187,7 +187,7 @@ fn transfer_points_ascend_and_jump_at_most_once() {
 }
 
 #[test]
-fn places_and_directions_must_make_sense() {
+fn positions_and_directions_must_make_sense() {
     let view = |position: [f64; 3], target: [f64; 3], up: [f64; 3]| json!({ "camera": { "position": position, "target": target, "up": up } });
     let (up, origin) = ([0.0, 1.0, 0.0], [0.0; 3]);
     assert!(scene(&view([0.0, 0.0, 1.0], origin, up)).is_ok());
@@ -221,7 +221,7 @@ fn places_and_directions_must_make_sense() {
 }
 
 #[test]
-fn several_problems_are_told_at_once() {
+fn several_problems_are_reported_at_once() {
     let error =
         scene(&json!({ "medium": { "density": -1 }, "film": { "tone": "x" }, "colour": 1 })).unwrap_err();
     let paths: Vec<_> = error.problems().iter().map(|problem| problem.path.as_str()).collect();

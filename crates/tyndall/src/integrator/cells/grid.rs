@@ -1,39 +1,40 @@
-//! A grid whose cells are as wide as a gather's radius: a gather finds everything in its own cell and the neighbouring ones.
+//! A grid whose cells are as wide as a gather's radius, so that a gather finds everything in its own cell and the
+//! neighbouring ones.
 
 use crate::math::{Bounds, DMat3, DVec3, Mat3, Vec3, cast};
 use crate::volume::Grid;
 
-/// Largest number of cells: a smaller radius gets wider cells.
+/// Maximum number of cells: for a smaller radius the cells are wider than the radius.
 const MOST_CELLS: f32 = (1 << 24) as f32;
 
-/// Margin by which a cell is wider than the radius: more than the rounding error of a position in single precision, so that a
-/// position rounded into the neighbouring cell still finds all within its radius. In a volume many radii wide the error grows
-/// with its extent.
+/// Margin by which a cell is wider than the radius: more than the rounding error of a position in single precision, so
+/// that a position rounded into the neighbouring cell still finds everything within its radius. In a volume many radii
+/// wide the error grows with the volume's extent.
 const MARGIN: f32 = 1e-4;
 const MARGIN_OF_EXTENT: f32 = 1.0 / (1 << 22) as f32;
 
-/// Bits of one axis of the paper's spatial history.
+/// Bits per axis of the spatial history of \[Jonsson12, sec. 4.3.2\].
 const AXIS_BITS: f32 = 64.0;
 
-/// Cells over the medium's box in *metric* space: the world about the box's middle, in units of the radius, which keeps numbers
-/// near 1 whatever the world's unit is.
+/// Cells over the medium's box in *metric* space: world space relative to the box's middle, in units of the radius,
+/// which keeps numbers near 1 whatever the world's unit is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CellGrid {
     middle: Vec3,
     linear: Mat3,
     origin: Vec3,
     edge: f32,
-    /// Of the edge.
+    /// As a share of the edge.
     margin: f32,
     per_edge: f32,
     dims: [usize; 3],
     index_reach: Vec3,
-    /// Metric vectors to index space.
+    /// From metric vectors to index space.
     to_index: Mat3,
 }
 
 impl CellGrid {
-    /// Over a volume's box, for a radius in world units and gathers that reach so many radii along an axis.
+    /// Over a volume's box, for a radius in world units and gathers that reach up to `reach` radii along an axis.
     pub fn new(grid: &Grid, radius: f32, reach: f32) -> Self {
         let middle = grid.index_bounds().center();
         let direction = DMat3::from_cols_array_2d(&grid.direction()).transpose();
@@ -48,7 +49,8 @@ impl CellGrid {
             edge *= 1.1;
         }
         let dims = cells(edge).to_array().map(cast::index);
-        // The extent of a box along an axis of index space is the sum of the absolute entries of that row of the inverse.
+        // The extent of a box along an axis of index space is the sum of the absolute entries of that row of the
+        // inverse.
         let rows = to_index.transpose();
         let entries = |row: Vec3| row.abs().element_sum();
         let box_ = Vec3::new(entries(rows.x_axis), entries(rows.y_axis), entries(rows.z_axis));
@@ -57,13 +59,13 @@ impl CellGrid {
         Self { middle, linear, origin: around.min, edge, margin, per_edge, dims, index_reach, to_index }
     }
 
-    /// Takes metric vectors to index space.
+    /// The matrix from metric vectors to index space.
     #[inline(always)]
     pub fn index_per_metric(&self) -> &Mat3 {
         &self.to_index
     }
 
-    /// How far a cell and its neighbours reach from any position in it, along each axis of index space.
+    /// How far a cell and its neighbours extend at most from a position in the cell, along each axis of index space.
     pub fn index_reach(&self) -> Vec3 {
         self.index_reach
     }
@@ -73,7 +75,7 @@ impl CellGrid {
         self.dims.iter().product()
     }
 
-    /// Index space to metric space.
+    /// From index space to metric space.
     #[inline(always)]
     pub fn to_metric(self, position: Vec3) -> Vec3 {
         self.linear * (position - self.middle)
@@ -91,13 +93,13 @@ impl CellGrid {
         cast::index((x - self.origin[axis]) * self.per_edge).min(self.dims[axis] - 1)
     }
 
-    /// The number of a cell, x fastest.
+    /// The index of a cell, x fastest.
     #[inline(always)]
     pub fn number(&self, [x, y, z]: [usize; 3]) -> usize {
         x + self.dims[0] * (y + self.dims[1] * z)
     }
 
-    /// Numbers of a cell and its neighbours.
+    /// Indices of a cell and its neighbours.
     pub fn neighbours(&self, [x, y, z]: [usize; 3]) -> impl Iterator<Item = usize> {
         let near = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
         let [nx, ny, nz] = self.dims;
@@ -106,7 +108,7 @@ impl CellGrid {
         })
     }
 
-    /// The cells that may hold something within reach of a metric position: first and last along each axis.
+    /// The cells that may contain items within reach of a metric position: first and last along each axis.
     #[inline(always)]
     pub fn around(&self, p: Vec3, reach: Vec3) -> [[usize; 2]; 3] {
         let (lo, hi) = (p - reach, p + reach);
@@ -117,7 +119,7 @@ impl CellGrid {
         ]
     }
 
-    /// Which of 64 bits along each axis a metric position has.
+    /// Along each axis, which of the 64 bits a metric position belongs to.
     pub fn axis_bins(&self, p: Vec3) -> [u32; 3] {
         [0, 1, 2].map(|axis| self.axis_bin(p[axis], axis))
     }
@@ -127,7 +129,7 @@ impl CellGrid {
         cast::fit_u32(cast::index(share * AXIS_BITS).min(63))
     }
 
-    /// Bits along each axis that lie in the cell of a metric position or its neighbours.
+    /// Along each axis, the bits that overlap the cell of a metric position or its neighbours.
     pub fn axis_reach(&self, p: Vec3) -> [u64; 3] {
         let r = 2.0 * self.edge * (1.0 + self.margin);
         [0, 1, 2].map(|axis| {

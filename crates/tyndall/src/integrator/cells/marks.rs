@@ -1,5 +1,5 @@
-//! The spatial history \[Jonsson12, sec. 4.3.2\]: marks of where items appeared, moved or vanished, queried by whatever reads
-//! items within reach.
+//! The spatial history \[Jonsson12, sec. 4.3.2\]: marks where items appeared, moved or vanished, queried by
+//! computations that read items within reach.
 
 use super::Positioned;
 use super::grid::CellGrid;
@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 pub(crate) struct ChangeMarks {
     kind: MarkKind,
     any: AtomicBool,
-    /// Number of marked positions, and the number past which every position counts as marked.
+    /// Number of marked positions, and the number above which every position counts as marked.
     marks: AtomicUsize,
     enough: usize,
 }
@@ -23,10 +23,10 @@ pub(crate) struct ChangeMarks {
 enum MarkKind {
     /// No marks are kept.
     Off,
-    /// A bit for each cell of the grid from which a changed item is within reach.
-    /// And one for each majorant cell, which is asked first.
+    /// A bit for each cell of the grid from which a changed item is within reach, and one for each majorant cell, which
+    /// is tested first.
     Cells { grid: CellGrid, near: Vec<AtomicU64>, coarse: Arc<Cells>, near_coarse: Vec<AtomicU64> },
-    /// Of each axis 64 bits, the paper's way: saturates soon.
+    /// 64 bits per axis, as in the paper: saturates soon.
     Axes { grid: CellGrid, axes: [AtomicU64; 3] },
 }
 
@@ -35,19 +35,19 @@ impl ChangeMarks {
         Self { kind, any: AtomicBool::new(false), marks: AtomicUsize::new(0), enough }
     }
 
-    /// Marks nothing.
+    /// Records no marks.
     pub fn off() -> Self {
         Self::of(MarkKind::Off, usize::MAX)
     }
 
-    /// Marks cells.
+    /// Records marks in cells.
     pub fn cells(grid: CellGrid, coarse: Arc<Cells>, enough: usize) -> Self {
         let bits = |count: usize| (0..count.div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
         let (near, near_coarse) = (bits(grid.len()), bits(coarse.ranges().len()));
         Self::of(MarkKind::Cells { grid, near, coarse, near_coarse }, enough)
     }
 
-    /// Marks positions along each axis.
+    /// Records marks along each axis.
     pub fn axes(grid: CellGrid, enough: usize) -> Self {
         Self::of(MarkKind::Axes { grid, axes: Default::default() }, enough)
     }
@@ -71,12 +71,12 @@ impl ChangeMarks {
         self.any.load(Ordering::Relaxed)
     }
 
-    /// Whether so many positions are marked that every one is to count as marked.
+    /// Whether so many positions are marked that every position counts as marked.
     pub fn everywhere(&self) -> bool {
         self.marks.load(Ordering::Relaxed) > self.enough
     }
 
-    /// Marks items that differ from those before, from the first difference on, and those that count as changed `otherwise`.
+    /// Marks the old and new items from the first one on that differs or counts as changed `otherwise`.
     pub fn mark_difference<P: Positioned + Pod>(&self, old: &[P], new: &[P], otherwise: impl Fn(&P) -> bool) {
         let same =
             |(old, new): (&P, &P)| bytemuck::bytes_of(old) == bytemuck::bytes_of(new) && !otherwise(new);
@@ -113,7 +113,7 @@ impl ChangeMarks {
         }
     }
 
-    /// Whether something marked may be within reach of a majorant cell.
+    /// Whether a marked position may be within reach of a majorant cell.
     #[inline]
     pub fn near_cell(&self, cell: usize) -> bool {
         match &self.kind {
@@ -123,7 +123,7 @@ impl ChangeMarks {
         }
     }
 
-    /// Whether something marked may be within reach of a position in index space.
+    /// Whether a marked position may be within reach of a position in index space.
     #[inline]
     pub fn near(&self, position: Vec3) -> bool {
         match &self.kind {
@@ -141,7 +141,7 @@ impl ChangeMarks {
 
 fn set(words: &[AtomicU64], i: usize) {
     let (word, bit) = (&words[i / 64], 1 << (i % 64));
-    // Most are set already, and reading is cheaper than writing.
+    // Most bits are already set, and reading is cheaper than writing.
     if word.load(Ordering::Relaxed) & bit == 0 {
         word.fetch_or(bit, Ordering::Relaxed);
     }

@@ -1,4 +1,4 @@
-//! Items with a position, in the cells of a grid: sorted by cell, and marked cell by cell where they changed.
+//! Items with a position, in the cells of a grid: sorted by cell, with marks on the cells where they changed.
 
 mod grid;
 mod marks;
@@ -10,7 +10,7 @@ pub(crate) use sorted::{CellSort, CellStarts, KEY_BYTES, SortedItems};
 
 use crate::math::Vec3;
 
-/// An item at one position.
+/// An item with a position.
 pub(crate) trait Positioned: Send + Sync {
     /// In index space.
     fn position(&self) -> Vec3;

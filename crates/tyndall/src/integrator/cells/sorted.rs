@@ -1,4 +1,4 @@
-//! Sorting by the cell of a grid, in pieces, so that a stop is heard soon and work goes on from there.
+//! Sorting items by grid cell, in pieces, so that a stop takes effect soon and the work can be resumed.
 
 use super::{CellGrid, Positioned};
 use crate::integrator::Limits;
@@ -7,12 +7,12 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Where each cell's items begin among those sorted by cell.
+/// The index at which each cell's items begin in the sorted order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct CellStarts(Vec<u32>);
 
 impl CellStarts {
-    /// The range of items in the cells of a row along x, from the first to the last, which are consecutive.
+    /// The range of items in the cells `x0` to `x1` of a row along x, which is contiguous.
     #[inline(always)]
     pub fn row(&self, grid: &CellGrid, [x0, x1]: [usize; 2], y: usize, z: usize) -> Range<usize> {
         let first = self.0[grid.number([x0, y, z])];
@@ -20,47 +20,47 @@ impl CellStarts {
         first as usize..end as usize
     }
 
-    /// Bytes kept.
+    /// Size in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.0[..])
     }
 }
 
-/// Items of several lists in the order of their cells, then of the lists, then as they stand in their list, so that what is
-/// added up in this order does not depend on what was computed when.
+/// Items of several lists, sorted by cell, then by list, then by position in the list, so that sums in this order do
+/// not depend on when the items were computed.
 #[derive(Debug, PartialEq)]
 pub(crate) struct SortedItems {
     keys: Vec<u64>,
     pub starts: CellStarts,
 }
 
-/// An item among the lists that were sorted.
+/// Where an item is in the lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ItemAddress {
     pub list: usize,
     pub index: usize,
 }
 
-/// Bits of a sorting key for the index in a list, then for the list, then for the cell.
+/// A sorting key consists, from the lowest bit, of the index in a list, the list, and the cell.
 const INDEX_BITS: u32 = 20;
 const LIST_BITS: u32 = 20;
 
-/// Bytes of an item while it is sorted: it stands in its block and in the whole.
+/// Bytes per item during sorting: a key in its block, and one in the result.
 pub(crate) const KEY_BYTES: u64 = 16;
 
-/// Items of lists that are sorted together at first: a millisecond's work.
+/// Maximum number of items that are sorted as one block, unless a single list has more: about a millisecond's work.
 const BLOCK: usize = 1 << 15;
 
-/// Items of a range of cells, unless a single cell has more.
+/// Maximum number of items of a range of cells, unless a single cell has more.
 const RANGE: u32 = 1 << 12;
 
 impl SortedItems {
-    /// How many there are.
+    /// Number of items.
     pub fn len(&self) -> usize {
         self.keys.len()
     }
 
-    /// The `i`-th item.
+    /// The address of the `i`-th item in sorted order.
     #[inline]
     pub fn address(&self, i: usize) -> ItemAddress {
         let key = self.keys[i];
@@ -71,14 +71,14 @@ impl SortedItems {
     }
 }
 
-/// A sort that is under way: first each block of lists by itself, while the items of each cell are counted; then ranges of cells,
-/// each of which takes its items from all blocks.
+/// A sort in progress. First each block of lists is sorted by itself, and the items of each cell are counted; then each range of
+/// cells merges its items from all blocks.
 #[derive(Debug)]
 pub(crate) struct CellSort {
     blocks: Vec<Block>,
     counts: Vec<AtomicU32>,
     ranges: Vec<CellRange>,
-    /// Empty until the ranges are known.
+    /// The result; empty until the ranges are known.
     keys: Vec<u64>,
     starts: Vec<u32>,
 }
@@ -91,7 +91,7 @@ struct Block {
     keys: Option<Vec<u64>>,
 }
 
-/// Cells whose items are consecutive in the end.
+/// A range of cells, whose items are contiguous in the result.
 #[derive(Debug)]
 struct CellRange {
     cells: Range<usize>,
@@ -100,7 +100,7 @@ struct CellRange {
 }
 
 impl CellSort {
-    /// A sort of lists of these lengths.
+    /// Starts a sort of lists of these lengths.
     ///
     /// # Panics
     /// If there are more than 2^20 lists, or items in one.
@@ -122,7 +122,7 @@ impl CellSort {
         Self { blocks, counts, ranges: Vec::new(), keys: Vec::new(), starts: Vec::new() }
     }
 
-    /// Goes on, in parallel on the current pool; `None` if a stop came first. The lists must be the same in every call.
+    /// Continues the sort, in parallel on the current pool; `None` if stopped first. The lists must be the same in every call.
     pub fn go_on<P: Positioned>(
         &mut self,
         grid: &CellGrid,
@@ -148,7 +148,7 @@ impl CellSort {
         })
     }
 
-    /// Finds where each cell begins, and divides the cells into ranges.
+    /// Computes the index at which each cell begins, and divides the cells into ranges.
     fn divide(&mut self) {
         let mut sum = 0;
         self.starts.reserve_exact(self.counts.len() + 1);
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn items_come_by_cell_then_list_then_index_whenever_the_work_was_stopped() {
+    fn items_are_sorted_by_cell_list_and_index_however_often_the_sort_is_stopped() {
         let volume = Grid::centred([16; 3], [1.0; 3]).unwrap();
         let grid = CellGrid::new(&volume, 1.1, 1.0);
         let lists = lists();

@@ -1,8 +1,10 @@
-//! Which values a cell's opacity bounds come from: a flight that crosses a cell depends on these, not on all values in the cell.
+//! Which values determine a cell's opacity bounds: a flight that crosses a cell depends on these, not on all values in
+//! the cell.
 //!
-//! A flight notes the groups that attain a cell's majorant. As long as their opacity stays, the majorant can only rise, by other
-//! groups; an edit that does so asks for the groups that attained the old one. A flight that neither meets has read the
-//! same majorants. The smallest opacity, which transmittance estimates also use, is recorded the same way.
+//! A flight records the groups that attain a cell's majorant. While their opacity is unchanged, other groups can only
+//! raise the majorant; an edit that raises it queries the groups that attained the old one. A flight that matches
+//! neither query has read unchanged majorants. The smallest opacity, which transmittance estimates also use, is
+//! recorded the same way.
 
 use super::touched::around;
 use crate::medium::{MajorantGrid, Medium};
@@ -10,23 +12,24 @@ use crate::transfer::{HistoryGroups, Historygram, TransferFunction};
 use crate::volume::ValueBins;
 use rayon::prelude::*;
 
-/// Bound of an opacity's rounding error, relative and absolute; with it a few groups too many count as attaining a bound.
+/// Bounds of an opacity's rounding error, relative and absolute; because of this margin a few too many groups count as
+/// attaining a bound.
 const ROUNDING: (f32, f32) = (1e-4, 1e-6);
 
-/// Of each majorant cell what its limits come from.
+/// For each majorant cell, the groups that determine its limits.
 #[derive(Debug)]
 pub(super) struct Bounds(Vec<Attained>);
 
-/// Groups of values that attain the limits of a cell.
+/// Groups of values that attain the opacity limits of a cell.
 #[derive(Clone, Copy, Debug)]
 struct Attained {
     least: Historygram,
-    /// Of an empty cell all groups that it can yield.
+    /// For an empty cell, all groups of values that can occur in it.
     most: Historygram,
 }
 
 impl Bounds {
-    /// Of a medium; `cells` says what groups each majorant cell can yield.
+    /// The bounds of a medium; `cells` gives the groups of values that can occur in each majorant cell.
     pub fn new(groups: &HistoryGroups, cells: &[Historygram], medium: &Medium) -> Self {
         let limits = limits(groups, medium.transfer());
         let (share, absolute) = ROUNDING;
@@ -41,21 +44,21 @@ impl Bounds {
         Self(cells.par_iter().zip(medium.majorants().opacities()).map(of_cell).collect())
     }
 
-    /// What a flight depends on when it reads a cell's majorant.
+    /// The groups on which a cell's majorant depends.
     #[inline(always)]
     pub fn most(&self, cell: usize) -> Historygram {
         self.0[cell].most
     }
 
-    /// What reading both limits of a cell depends on.
+    /// The groups on which both limits of a cell depend.
     #[inline(always)]
     pub fn limits(&self, cell: usize) -> Historygram {
         let Attained { least, most } = self.0[cell];
         least | most
     }
 
-    /// What must be queried in addition to the groups whose opacity an edit changed: groups of cells whose smallest opacity falls
-    /// or whose majorant rises. For empty cells the changed groups suffice.
+    /// Groups that an edit must query besides those whose opacity it changed: groups of cells whose smallest opacity
+    /// falls, and of cells whose majorant rises. For empty cells the changed groups suffice.
     pub fn moved(&self, old: &MajorantGrid, new: &MajorantGrid) -> [Historygram; 2] {
         let mut query = [Historygram::EMPTY; 2];
         for ((old, new), attained) in old.opacities().iter().zip(new.opacities()).zip(&self.0) {

@@ -1,4 +1,4 @@
-//! Histories: which data values a computation has read, and what an edit asks of them \[Jonsson12, sec. 4.2\].
+//! Histories: which data values a computation has read, and the queries of an edit to them \[Jonsson12, sec. 4.2\].
 
 mod bounds;
 mod packed;
@@ -12,8 +12,8 @@ use crate::transfer::{Grouping, HistoryGroups, Historygram};
 use crate::volume::ValueBins;
 use bounds::Bounds;
 
-/// What a light path or one of its vertices depends on: values read in flight, for their opacity, and values at scatterings,
-/// for their albedo and surfaces. Both accumulate along the path.
+/// What a light path or one of its vertices depends on: opacities of the values read in flight, and albedo and surface
+/// of the values at scatterings. Both accumulate along the path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Past {
     pub flight: Historygram,
@@ -23,7 +23,7 @@ pub(crate) struct Past {
 impl Past {
     pub const NOTHING: Self = Self { flight: Historygram::EMPTY, scatter: Historygram::EMPTY };
 
-    /// Whether something of it has changed.
+    /// Whether any of the values in `query` are in it.
     #[inline]
     pub fn meets(&self, query: &Self) -> bool {
         self.flight.meets(query.flight) || self.scatter.meets(query.scatter)
@@ -39,17 +39,17 @@ impl Past {
     }
 }
 
-/// What reading a medium leaves in a history.
+/// The history entries that reading a medium produces.
 #[derive(Debug)]
 pub(crate) struct Reading {
     pub groups: HistoryGroups,
-    /// Of each majorant cell the groups of values that it can yield.
+    /// For each majorant cell, the groups of values that can occur in it.
     pub cells: Vec<Historygram>,
     bounds: Bounds,
 }
 
 impl Reading {
-    /// Of a medium whose values are put into so many groups.
+    /// For a medium whose values are divided into this many groups.
     pub fn new(medium: &Medium, groups: u8, grouping: Grouping) -> Self {
         let volume = medium.volume();
         let groups = HistoryGroups::new(volume, groups, grouping);
@@ -61,13 +61,13 @@ impl Reading {
         Self { groups, cells, bounds }
     }
 
-    /// What reading the optics of a value leaves.
+    /// The history entry for reading the optical properties of a value.
     #[inline(always)]
     pub fn of(&self, bins: ValueBins, value: f32) -> Historygram {
         self.groups.of(bins.bin(value))
     }
 
-    /// Updates to a medium with other opacities; returns what flights must be queried for in addition to the groups whose
+    /// Updates to a medium with other opacities; returns what flights must be queried for besides the groups whose
     /// opacity changed, see [`Bounds::moved`].
     pub fn update(&mut self, old: &Medium, new: &Medium) -> [Historygram; 2] {
         let moved = self.bounds.moved(old.majorants(), new.majorants());
@@ -75,7 +75,7 @@ impl Reading {
         moved
     }
 
-    /// A recorder of what a path reads, starting from what it has read so far.
+    /// A recorder of what a path reads, starting with what it has read so far.
     #[inline(always)]
     pub fn writer<'a>(&'a self, medium: &'a Medium, past: Past) -> Writer<'a> {
         Writer { reading: self, bins: medium.transfer().bins(), past }
@@ -91,7 +91,7 @@ pub(crate) struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// What reading the optics of a value leaves.
+    /// The history entry for reading the optical properties of a value.
     #[inline(always)]
     pub fn read(&self, value: f32) -> Historygram {
         self.reading.of(self.bins, value)

@@ -1,18 +1,18 @@
-//! Many Historygrams in the bytes that their groups need.
+//! Historygrams packed into as many bytes as their groups need.
 
 use crate::math::cast;
 use crate::transfer::Historygram;
 
-/// Historygrams side by side, in 4, 8 or 16 bytes each.
+/// An array of Historygrams of 4, 8 or 16 bytes each.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct PackedHistories {
-    /// Words of 32 bits each, the lowest first.
+    /// Words of 32 bits, the lowest of each Historygram first.
     words: Vec<u32>,
     width: usize,
 }
 
 impl PackedHistories {
-    /// Empty; for Historygrams of so many groups.
+    /// An empty array for Historygrams of this many groups.
     pub fn new(groups: u8) -> Self {
         Self { words: Vec::new(), width: usize::from(groups).div_ceil(32) }
     }
@@ -29,7 +29,7 @@ impl PackedHistories {
         self.words.extend((0..self.width).map(|word| part(bits, word)));
     }
 
-    /// Makes room for so many more.
+    /// Reserves space for `more` Historygrams.
     pub fn reserve(&mut self, more: usize) {
         self.words.reserve_exact(self.width * more);
     }
@@ -47,7 +47,7 @@ impl PackedHistories {
         Historygram::from_bits(words.iter().rev().fold(0, |bits, &word| bits << 32 | u128::from(word)))
     }
 
-    /// Appends some of another's.
+    /// Appends a range of another array.
     pub fn extend(&mut self, other: &Self, range: std::ops::Range<usize>) {
         self.words.extend_from_slice(&other.words[range.start * self.width..range.end * self.width]);
     }

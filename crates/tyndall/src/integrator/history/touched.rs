@@ -5,16 +5,17 @@ use crate::scene::{Difference, Scene};
 use crate::transfer::{BinSet, HistoryGroups, Historygram, TransferFunction};
 use crate::volume::ValueBins;
 
-/// The query with which an edit tests histories \[Jonsson12, sec. 4.2\], if it left volume, clips and random numbers unchanged.
+/// The query with which an edit tests histories \[Jonsson12, sec. 4.2\], for edits that leave volume, clips and random
+/// numbers unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Touched {
-    /// Values whose change makes a path diverge from the retraced one.
+    /// Values whose change may alter a path.
     pub paths: Past,
     /// Values whose change is visible along a view ray.
     pub view: Historygram,
-    /// Values that are or were matter.
+    /// Values with non-zero opacity before or after the edit.
     pub matter: Historygram,
-    /// Whether paths from glowing matter start at other positions.
+    /// Whether paths from glowing matter may start differently.
     pub glow: bool,
 }
 
@@ -35,11 +36,11 @@ impl Touched {
         if difference.phase || difference.surfaces {
             scatter = Historygram::ALL;
         }
-        // Where there is no matter nothing scatters.
+        // Nothing scatters where there is no matter.
         let scatter = scatter & matter;
         let glowing = bins_where(&|transfer, bin| transfer.emission_bound(around(transfer, bin)) > 0.0);
         let emission = groups.query(&transfer.emission);
-        // A cell's weight depends on everything in it, also on what does not glow.
+        // The weight of a cell depends on all matter in it, including matter that does not glow.
         let positions = [old, new].map(|scene| scene.lights.emission());
         let moved = matches!(positions, [Some(old), Some(new)] if !old.same_cells(new));
         Self {
@@ -51,7 +52,7 @@ impl Touched {
     }
 }
 
-/// An interval that certainly contains the values of a bin.
+/// An interval that contains all values of a bin, despite rounding.
 pub(super) fn around(transfer: &TransferFunction, bin: usize) -> [f32; 2] {
     let bins = transfer.bins();
     let lo = if bin == 0 { f32::MIN } else { bins.value(bin as f32 - 0.01) };

@@ -1,5 +1,5 @@
-//! A chunk: up to 1024 paths of one light that start near each other. They are traced together, so that they read the same matter,
-//! and retraced where an edit touched them.
+//! A chunk: up to 1024 paths of one light that start close together. They are traced together, so that they read the
+//! same matter; an edit retraces those that it touched.
 
 use super::tracer::{LightPath, Resumed, Tracer, Vertex, Vertices, bounce_of};
 use super::{HistoryDetail, PathNumbers};
@@ -10,34 +10,34 @@ use crate::math::cast;
 use crate::simd::{Kernel, Lanes};
 use std::ops::Range;
 
-/// Most paths in a chunk.
+/// Maximum number of paths in a chunk.
 pub(super) const PATHS: usize = 1024;
 
 /// Paths of one light, with their interactions and what both depend on.
 #[derive(Clone, Debug)]
 pub(crate) struct Chunk<V> {
-    /// Numbers of the paths among those of their light.
+    /// Numbers of the paths among those of the light.
     paths: Vec<u32>,
-    /// All of them, or none yet.
+    /// The results: of all paths, or of none yet.
     traced: Traced<V>,
     /// What has changed since they were traced.
     changed: Past,
-    /// Their replacement, if a stop interrupted retracing.
+    /// The partial replacement of `traced`, if a stop interrupted retracing.
     underway: Option<Box<Underway<V>>>,
 }
 
 /// Bytes of a chunk, histories included.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct ChunkBytes {
-    /// Of what belongs to whole paths.
+    /// Bytes of data per path.
     pub paths: usize,
     pub vertices: usize,
 }
 
-/// Paths that have been traced, from the first on.
+/// Traced paths, in order from the first.
 #[derive(Clone, Debug)]
 struct Traced<V> {
-    /// Where each path's interactions end.
+    /// The end of each path's range of interactions.
     ends: Vec<u32>,
     /// What each path as a whole depends on.
     flight: PackedHistories,
@@ -45,7 +45,7 @@ struct Traced<V> {
     vertices: Vertices<V>,
 }
 
-/// Paths that have been traced again, and the next one on its way.
+/// Paths that have been retraced, and the next one if it is unfinished.
 #[derive(Clone, Debug)]
 struct Underway<V> {
     traced: Traced<V>,
@@ -67,8 +67,8 @@ impl<V: Vertex> Traced<V> {
         Past { flight: self.flight.get(path), scatter: self.scatter.get(path) }
     }
 
-    /// The interactions of a path that changes leave valid: since histories only grow along a path, all up to one
-    /// \[Jonsson12, sec. 4.3.1\].
+    /// The interactions of a path that a change leaves valid: since histories only grow along a path, these are the
+    /// first ones \[Jonsson12, sec. 4.3.1\].
     fn valid(&self, path: usize, changed: &Past) -> Range<usize> {
         let whole = self.range(path);
         let is_valid = |past: Past| !past.meets(changed);
@@ -76,14 +76,14 @@ impl<V: Vertex> Traced<V> {
         whole.start..valid.map_or(whole.start, |i| i + 1)
     }
 
-    /// Ends a path whose interactions are there.
+    /// Ends a path whose interactions have been added.
     fn end(&mut self, past: &Past) {
         self.flight.push(past.flight);
         self.scatter.push(past.scatter);
         self.ends.push(cast::fit_u32(self.vertices.stored.len()));
     }
 
-    /// Releases memory that is not needed.
+    /// Releases unused memory.
     fn shrink_to_fit(&mut self) {
         self.ends.shrink_to_fit();
         self.flight.shrink_to_fit();
@@ -93,7 +93,7 @@ impl<V: Vertex> Traced<V> {
 }
 
 impl<V: Vertex> Chunk<V> {
-    /// Paths yet to be traced.
+    /// A chunk of paths yet to be traced.
     pub fn new(paths: Vec<u32>, groups: u8, histories: HistoryDetail) -> Self {
         let traced = Traced::new(groups, histories == HistoryDetail::Vertices);
         Self { paths, traced, changed: Past::NOTHING, underway: None }
@@ -104,7 +104,7 @@ impl<V: Vertex> Chunk<V> {
         &self.traced.vertices.stored
     }
 
-    /// Paths in it.
+    /// Number of paths.
     pub fn len(&self) -> usize {
         self.paths.len()
     }
@@ -118,7 +118,7 @@ impl<V: Vertex> Chunk<V> {
         self.is_traced() && self.changed.is_empty()
     }
 
-    /// What an edit changed.
+    /// Records what an edit changed.
     pub fn add_change(&mut self, changed: &Past) {
         if !changed.is_empty() {
             self.changed.add(changed);
@@ -126,7 +126,7 @@ impl<V: Vertex> Chunk<V> {
         }
     }
 
-    /// Bytes kept for the paths themselves, and for their interactions.
+    /// Bytes of the paths themselves, and of their interactions.
     pub fn bytes(&self) -> ChunkBytes {
         let Traced { ends, flight, scatter, vertices } = &self.traced;
         let histories = flight.bytes() + scatter.bytes();
@@ -134,7 +134,7 @@ impl<V: Vertex> Chunk<V> {
         ChunkBytes { paths, vertices: vertices.bytes() }
     }
 
-    /// Number of paths that differ from those of another chunk of the same path numbers, or were not traced there.
+    /// Number of paths that differ from those of another chunk, or were not traced there.
     pub fn differing(&self, other: &Self) -> usize {
         let vertices = |chunk: &Self, path| {
             bytemuck::cast_slice::<_, u8>(&chunk.vertices()[chunk.traced.range(path)]).to_vec()
@@ -149,13 +149,14 @@ impl<V: Vertex> Chunk<V> {
     }
 }
 
-/// Retraces the invalid paths of a chunk, each from its last valid vertex on, until a stop; returns how many were traced.
+/// Retraces the invalid paths of a chunk, each from its last valid vertex on, until a stop; returns how many were
+/// traced.
 pub(super) struct Update<'a, V> {
     pub chunk: &'a mut Chunk<V>,
     pub tracer: Tracer<'a>,
-    /// The numbers of a path.
+    /// The paths' random numbers.
     pub numbers: PathNumbers,
-    /// Where vertices changed.
+    /// Marks for the positions where vertices change.
     pub marks: &'a ChangeMarks,
     pub stop: &'a Stop<'a>,
 }
@@ -195,7 +196,7 @@ impl<V: Vertex> Kernel for Update<'_, V> {
                     chunk.underway = Some(Box::new(next));
                     return retraced;
                 }
-                // A gather weighs photons by the opacity where they are.
+                // A gather weights photons by the opacity at their positions.
                 let matter_changed = |vertex: &V| tracer.read_at(vertex.position()).meets(changed.flight);
                 let first = new.ends.last().map_or(0, |&end| end as usize) + kept.len();
                 let of_old = &old.vertices.stored[kept.end..of_old.end];

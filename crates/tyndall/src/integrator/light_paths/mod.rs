@@ -1,5 +1,6 @@
-//! Paths from the lights of a scene and from its glowing matter, generic over what a method stores at a vertex. Each light has
-//! equally many, so that no edit of one light changes the paths of others; an edit retraces those that it touched.
+//! Paths from the lights of a scene and from its glowing matter, generic over what a method stores at a vertex. All
+//! lights have the same number of paths, so that editing one light does not change the paths of others; an edit
+//! retraces the paths that it touched.
 
 mod chunk;
 mod tracer;
@@ -28,14 +29,14 @@ use tracer::{EmissionSource, Tracer};
 pub(crate) struct LightPaths<V> {
     /// `None` for glowing matter.
     pub light: Option<Light>,
-    /// Tells its random numbers from those of other lights.
+    /// Distinguishes its random numbers from those of other lights.
     pub stream: u32,
     pub chunks: Vec<Chunk<V>>,
     /// Number of paths started, including those that missed.
     pub count: u32,
 }
 
-/// What tracing needs beside the scene.
+/// What tracing needs besides the scene.
 #[derive(Debug)]
 pub(crate) struct Ground {
     pub reading: Reading,
@@ -46,13 +47,13 @@ pub(crate) struct Ground {
 /// Which part of a path has a history of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum HistoryDetail {
-    /// Each vertex: an edit retraces a path from where it touched it.
+    /// Each vertex: an edit retraces a path from the first vertex that it touched.
     Vertices,
-    /// The whole path: an edit retraces it from its beginning.
+    /// The whole path: an edit retraces it from the beginning.
     Paths,
 }
 
-/// What paths to make for each light.
+/// Which paths to create for each light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plan {
     pub count: u32,
@@ -64,7 +65,7 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// Paths of each of so many sources, when there are `paths` in all.
+    /// Number of paths of each source, out of `paths` in total.
     pub fn share(paths: u32, sources: usize) -> u32 {
         (paths / cast::fit_u32(sources.max(1))).max(1)
     }
@@ -79,24 +80,25 @@ pub(crate) struct PathNumbers {
 }
 
 impl PathNumbers {
-    /// Of one path.
+    /// The random numbers of one path.
     #[inline(always)]
     fn of(&self, path: u32) -> LightPathSampler {
         LightPathSampler::new(self.seed, self.pass, self.stream, path)
     }
 }
 
-/// What paths start from.
+/// The source of light paths.
 #[derive(Clone, Debug)]
 pub(crate) struct PathSource {
     /// `None` for glowing matter.
     pub light: Option<Light>,
-    /// Tells its random numbers from those of other sources.
+    /// Distinguishes its random numbers from those of other sources.
     pub stream: u32,
 }
 
-/// A scene's lights and its glowing matter, with the streams of their random numbers: by name where a light has one, so that
-/// it keeps them when others come and go; else by its number. In the order of the streams, in which light is added up too.
+/// A scene's lights and its glowing matter, with the streams of their random numbers. A stream is derived from the
+/// light's name if it has one, so that adding or removing other lights does not change it; otherwise from its index.
+/// Sorted by stream, which is also the order in which light is summed.
 pub(crate) fn sources(scene: &Scene) -> Vec<PathSource> {
     let lights = scene.lights.lights();
     let mut first_of: HashMap<&str, usize> = HashMap::new();
@@ -123,7 +125,8 @@ fn hash_of(name: &str) -> u32 {
 }
 
 impl<V: Vertex> LightPaths<V> {
-    /// Paths yet to be traced. In each block of paths that are stratified together, those that start alike come together.
+    /// Paths yet to be traced. Within each block of paths that are stratified together, they are sorted so that paths
+    /// with similar starts are adjacent.
     pub fn new(PathSource { light, stream }: PathSource, plan: &Plan) -> Self {
         let Plan { count, seed, pass, groups, histories } = *plan;
         const BLOCK: u32 = LightPathSampler::STRATIFIED;
@@ -142,7 +145,7 @@ impl<V: Vertex> LightPaths<V> {
         Self { light, stream, chunks, count }
     }
 
-    /// Changes how many paths there are; whole blocks that are in both stay as they are.
+    /// Changes the number of paths; whole blocks that exist both before and after are kept.
     pub fn set_count(&mut self, plan: &Plan) {
         let other = Self::new(PathSource { light: self.light.take(), stream: self.stream }, plan);
         let whole = (self.count.min(plan.count) / LightPathSampler::STRATIFIED) as usize;
@@ -151,7 +154,7 @@ impl<V: Vertex> LightPaths<V> {
         self.chunks.iter_mut().zip(old.chunks).take(chunks).for_each(|(new, old)| *new = old);
     }
 
-    /// What the flux of its photons is to be multiplied by.
+    /// The factor for the flux of its photons.
     pub fn color(&self) -> Rgb {
         self.light.as_ref().map_or(Rgb::WHITE, Light::color)
     }
@@ -161,29 +164,29 @@ impl<V: Vertex> LightPaths<V> {
     }
 }
 
-/// What tracing the paths of all lights needs.
+/// What is needed to trace the paths of all lights.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tracing<'a> {
     pub scene: &'a Scene,
     pub ground: &'a Ground,
-    /// The refinement pass whose paths these are; 0 is what an edit keeps.
+    /// The refinement pass to which the paths belong; 0 is the base map, which edits keep.
     pub pass: u32,
-    /// Where vertices change.
+    /// Marks for the positions where vertices change.
     pub marks: &'a ChangeMarks,
     pub limits: &'a Limits<'a>,
 }
 
-/// How far tracing came.
+/// Progress of tracing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct TracingProgress {
-    /// Paths traced.
+    /// Number of paths traced.
     pub traced: usize,
-    /// Whether all paths are valid now, so that no stop came first.
+    /// Whether all paths are valid now; false if it was stopped first.
     pub finished: bool,
 }
 
 impl Tracing<'_> {
-    /// Traces the paths that are not valid.
+    /// Traces the invalid paths.
     pub fn trace<V: Vertex>(&self, lights: &mut [LightPaths<V>]) -> TracingProgress {
         let Self { scene, ground: Ground { reading, enclosure, level }, pass, marks, limits } = *self;
         let seed = scene.render.seed;
@@ -211,7 +214,7 @@ impl Tracing<'_> {
     }
 }
 
-/// The position of four numbers in [0, 1) on a curve that fills their space: similar numbers have positions near each other.
+/// The Morton code of four numbers in [0, 1): similar numbers have similar codes.
 fn morton(u: [f32; 4]) -> u32 {
     let steps = u.map(|u| cast::low_u32(cast::index(u * 256.0) as u64));
     let bit = |i: u32| {

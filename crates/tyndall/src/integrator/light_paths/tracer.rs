@@ -1,4 +1,4 @@
-//! Light paths, each of whose vertices knows what it depends on \[Jonsson12, sec. 3.2, 4.3.1\].
+//! Tracing of light paths; each vertex is stored with what it depends on \[Jonsson12, sec. 3.2, 4.3.1\].
 
 use crate::integrator::Stop;
 use crate::integrator::cells::Positioned;
@@ -12,31 +12,33 @@ use crate::transfer::Historygram;
 use bytemuck::Pod;
 use std::fmt::Debug;
 
-/// What a method stores where a light path interacts with matter. A path can go on from it.
+/// What a method stores where a light path interacts with matter. A path can be resumed from it.
 pub(crate) trait Vertex: Positioned + Pod + Debug + PartialEq {
-    /// Light that arrives at an interaction.
+    /// From the light that arrives at an interaction.
     fn new(arrival: &Arrival) -> Self;
 
-    /// In which the light travels.
+    /// The direction in which the light travels.
     fn direction(&self) -> Vec3;
 
-    /// Flux per unit of its light's colour, times the paths of that light: of this vertex and of those left out like it.
+    /// Flux per unit of the light's colour, times the number of that light's paths. Compensates for vertices that were
+    /// not stored.
     fn flux(&self) -> Rgb;
 }
 
-/// Light that arrives where it interacts with matter.
+/// Light that arrives at an interaction with matter.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arrival {
     /// Index space.
     pub position: Vec3,
-    /// In which it travels.
+    /// The direction in which the light travels.
     pub direction: Vec3,
     /// As [`Vertex::flux`].
     pub flux: Rgb,
 }
 
-/// The first vertices of a path are all stored, later ones with falling probability, carrying the flux of those left out: light
-/// of long paths is spread so widely that storing all of it would cost memory without reducing noise.
+/// The first vertices of a path are all stored, later ones with decreasing probability and with flux that compensates
+/// for those left out: light of long paths is so diffuse that storing every vertex would cost memory without reducing
+/// noise.
 const WHOLE: u32 = 4;
 
 /// Probability that a vertex is stored, by the number of scatterings before it.
@@ -44,7 +46,7 @@ fn chance(bounce: u32) -> f32 {
     WHOLE as f32 / (bounce + 1).max(WHOLE) as f32
 }
 
-/// Whether a path stores its vertex after so many scatterings.
+/// Whether a path stores its vertex after `bounce` scatterings.
 fn is_kept(numbers: &LightPathSampler, bounce: u32) -> bool {
     numbers.bounce(bounce).light_choice < chance(bounce)
 }
@@ -55,31 +57,31 @@ pub(super) fn bounce_of(numbers: &LightPathSampler, kept: usize) -> u32 {
     bounces.nth(kept).unwrap_or(u32::MAX)
 }
 
-/// Interactions of a path that are kept on average if none is absorbed: of `max_scatter` the first few, and of the others the
-/// sum of their chances.
+/// Expected number of stored interactions of a path that is not absorbed: all of the first few of `max_scatter`, plus
+/// the sum of the probabilities of the others.
 pub(crate) fn most_kept(max_scatter: u32) -> f64 {
     let whole = f64::from(WHOLE);
     let last = f64::from(max_scatter);
     if last <= whole { last } else { whole * (1.0 + (last / whole).ln()) }
 }
 
-/// What light paths start from.
+/// The source of a light path.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum EmissionSource<'a> {
     Light(&'a Light),
     Matter(&'a Emission),
 }
 
-/// Vertices of paths, one path after the other, with what each depends on.
+/// The vertices of paths, path by path, with what each depends on.
 #[derive(Clone, Debug)]
 pub(super) struct Vertices<V> {
     pub stored: Vec<V>,
-    /// Of each, for flight and scattering; `None` where paths have one alone.
+    /// What each depends on, for flight and scattering; `None` if only whole paths have a history.
     pasts: Option<[PackedHistories; 2]>,
 }
 
 impl<V: Vertex> Vertices<V> {
-    /// None yet.
+    /// Empty.
     pub fn new(groups: u8, each_has_a_past: bool) -> Self {
         let pasts = each_has_a_past.then(|| [PackedHistories::new(groups), PackedHistories::new(groups)]);
         Self { stored: Vec::new(), pasts }
@@ -90,7 +92,7 @@ impl<V: Vertex> Vertices<V> {
         self.pasts.is_some()
     }
 
-    /// What a vertex depends on; `None` where that is not known apart from its path.
+    /// What a vertex depends on; `None` if only whole paths have a history.
     #[inline]
     pub fn past(&self, i: usize) -> Option<Past> {
         let [flight, scatter] = self.pasts.as_ref()?;
@@ -106,7 +108,7 @@ impl<V: Vertex> Vertices<V> {
         }
     }
 
-    /// Appends some of another's.
+    /// Appends a range of other vertices.
     pub fn extend(&mut self, other: &Self, range: std::ops::Range<usize>) {
         self.stored.extend_from_slice(&other.stored[range.clone()]);
         if let (Some([flight, scatter]), Some([of_flight, of_scatter])) = (&mut self.pasts, &other.pasts) {
@@ -115,7 +117,7 @@ impl<V: Vertex> Vertices<V> {
         }
     }
 
-    /// Releases memory that is not needed.
+    /// Releases unused memory.
     pub fn shrink_to_fit(&mut self) {
         self.stored.shrink_to_fit();
         self.pasts.iter_mut().flatten().for_each(PackedHistories::shrink_to_fit);
@@ -127,7 +129,7 @@ impl<V: Vertex> Vertices<V> {
     }
 }
 
-/// What tracing reads.
+/// The inputs of tracing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tracer<'a> {
     pub scene: &'a Scene,
@@ -136,24 +138,24 @@ pub(super) struct Tracer<'a> {
     pub reading: &'a Reading,
 }
 
-/// The vertex from which a path goes on.
+/// The vertex from which a path is resumed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Resumed<V> {
     pub vertex: V,
-    /// Scatterings before it.
+    /// Number of scatterings before it.
     pub bounce: u32,
     pub past: Past,
 }
 
-/// A light path on its way.
+/// A light path being traced.
 #[derive(Clone, Debug)]
 pub(super) struct LightPath {
-    /// `None` where it has ended.
+    /// `None` if it has ended.
     flight: Option<Flight>,
     pub past: Past,
 }
 
-/// Light on its way between two interactions.
+/// Light in flight between two interactions.
 #[derive(Clone, Debug)]
 struct Flight {
     ray: Ray,
@@ -166,13 +168,13 @@ impl Tracer<'_> {
         &self.scene.medium
     }
 
-    /// What reading the optics at a position leaves in a history.
+    /// The history entry for reading the optical properties at a position.
     #[inline(always)]
     pub fn read_at(&self, position: Vec3) -> Historygram {
         self.reading.of(self.medium().transfer().bins(), self.medium().volume().value(position))
     }
 
-    /// A path at its beginning, or where it is to go on from one of its vertices.
+    /// A path at its beginning, or resumed from one of its vertices.
     #[inline(always)]
     pub fn begin<V: Vertex>(&self, numbers: &LightPathSampler, from: Option<Resumed<V>>) -> LightPath {
         let mut past = from.map_or(Past::NOTHING, |from| from.past);
@@ -183,8 +185,8 @@ impl Tracer<'_> {
         LightPath { flight, past }
     }
 
-    /// Continues to the path's end, or until a stop, but for at least one scattering; returns whether the path has ended. Its past
-    /// then is what the whole path depends on, including matter that it passed without a collision.
+    /// Continues to the path's end, or until a stop, but for at least one scattering; returns whether the path has
+    /// ended. If so, its past is what the whole path depends on, including matter that it passed without a collision.
     #[inline(always)]
     pub fn go_on<V: Vertex>(
         &self,
@@ -235,8 +237,9 @@ impl Tracer<'_> {
         }))
     }
 
-    /// Scatters or absorbs the light \[Jonsson12, eq. 7\]: it survives with the albedo of its brightest channel, which depends on
-    /// the position alone and not on the path's flux, so that a black channel does not end the others.
+    /// Scatters or absorbs the light \[Jonsson12, eq. 7\]: it survives with a probability equal to the albedo of the
+    /// brightest channel, which depends only on the position and not on the path's flux, so that a black channel does
+    /// not end the others.
     #[inline(always)]
     fn scatter<V: Vertex>(
         &self,

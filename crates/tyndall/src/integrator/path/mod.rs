@@ -1,10 +1,10 @@
-//! Unbiased Monte Carlo: one path from the camera per sample, by the scheme of Exposure Render as
-//! \[Khlebnikov14, sec. 3\] tells it, extended to any order of scattering.
+//! Unbiased Monte Carlo: one path from the camera per sample, by the scheme of Exposure Render as described in
+//! \[Khlebnikov14, sec. 3\], extended to any order of scattering.
 //!
-//! A path flies to a collision, samples one light there, scatters, and flies on. Light
-//! found both ways is weighted by the balance heuristic \[Veach97\]. Paths have any length and no stack.
-//! A session that is to be edited keeps samples with what they depend on, so that an edit retakes only those that it
-//! touched.
+//! A path flies to a collision, samples one light there, scatters, and flies on. Light that can be found by light
+//! sampling and by scattering is weighted by the balance heuristic \[Veach97\]. Paths may have any length and need no
+//! stack. A session that will be edited keeps samples with what they depend on, so that an edit retakes only those that
+//! it touched.
 
 mod samples;
 mod settings;
@@ -25,23 +25,23 @@ use samples::{SampleCounts, SampleKeeper, SampleTile};
 use std::any::Any;
 use tracer::{CameraPath, TraceOne, TracePixels};
 
-/// The path tracer. With memory for samples, an edit retakes only those that it touched.
+/// The path tracer. If it has memory to keep samples, an edit retakes only those that it touched.
 #[derive(Debug)]
 pub struct PathTracer {
     level: Level,
     keeper: Option<SampleKeeper>,
 }
 
-/// What is kept of a tile.
+/// State of a tile.
 #[derive(Debug, Default)]
 pub struct TileState {
-    /// A path that a stop left half done.
+    /// A path that a stop left unfinished.
     pending: Option<CameraPath>,
     samples: SampleTile,
 }
 
 impl PathTracer {
-    /// With these vector instructions; keeps nothing.
+    /// With these vector instructions; keeps no samples.
     #[must_use]
     pub fn with_level(level: Level) -> Self {
         Self { level, keeper: None }
@@ -70,7 +70,7 @@ impl Method for PathTracer {
     }
 
     fn is_touched_by(&self, difference: &Difference) -> bool {
-        // Cells decide which numbers tracking draws.
+        // Majorant cells determine which random numbers tracking uses.
         difference.view() || difference.light() || difference.majorants || difference.seed
     }
 

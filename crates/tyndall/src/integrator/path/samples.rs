@@ -1,5 +1,5 @@
-//! Samples that survive edits \[Jonsson12, sec. 7\]: each is kept with its histories, and only those that an edit touched are
-//! retaken.
+//! Samples that survive edits \[Jonsson12, sec. 7\]: each is kept with its histories, and an edit retakes only those
+//! that it touched.
 
 use crate::film::{PixelSample, Tile};
 use crate::integrator::history::{PackedHistories, Past, Reading, Touched};
@@ -15,16 +15,16 @@ const GROUPS: u8 = 64;
 /// Bytes of a sample with its histories.
 const BYTES: usize = size_of::<KeptSample>() + 2 * GROUPS as usize / 8;
 
-/// What a session's samples are kept by.
+/// Decides which samples of a session are kept, and which an edit invalidates.
 #[derive(Debug)]
 pub(super) struct SampleKeeper {
     pub reading: Reading,
-    /// Samples of each pixel that are kept.
+    /// Maximum number of samples kept per pixel.
     most: usize,
 }
 
 impl SampleKeeper {
-    /// Of a scene whose samples may take so many bytes; `None` where that is too few to keep one of every pixel.
+    /// For a scene whose kept samples may occupy `bytes`; `None` if that is too little for one sample per pixel.
     pub fn new(scene: &Scene, bytes: usize) -> Option<Self> {
         let most = Self::most(scene, bytes);
         let reading = || Reading::new(&scene.medium, GROUPS, Grouping::Quantile);
@@ -36,7 +36,7 @@ impl SampleKeeper {
         bytes / BYTES / width / height
     }
 
-    /// Whether the next sample of a tile is to be kept: an early one, with none missing before it.
+    /// Whether to keep the next sample of a tile: if it is within the limit and no earlier one is missing.
     pub fn wants(&self, kept: &SampleTile, tile: &Tile) -> bool {
         let next = tile.taken();
         next < self.most * tile.pixel_count() && next <= kept.samples.len()
@@ -57,7 +57,7 @@ impl SampleKeeper {
         }
         let lights = !difference.lights.is_empty();
         if lights || touched.glow {
-            // Every scattering samples one of all lights, chosen by power.
+            // Every scattering samples one light, chosen among all by power.
             past.scatter = touched.matter;
         }
         let shows_sky = |scene: &Scene| scene.background == Background::Environment && scene.lights.has_sky();
@@ -66,25 +66,25 @@ impl SampleKeeper {
     }
 }
 
-/// What samples are asked for after an edit.
+/// The query that an edit sends to samples.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SampleQuery {
     past: Past,
-    /// Whether rays that meet nothing see something else.
+    /// Whether the background that rays see when they meet no matter has changed.
     behind: bool,
 }
 
-/// What a sample found.
+/// The result of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 struct KeptSample {
-    /// The first is NaN where the sample must be retaken.
+    /// The first component is NaN if the sample must be retaken.
     radiance: [f32; 3],
-    /// NaN where no matter was met.
+    /// NaN if no matter was met.
     depth: f32,
 }
 
-/// The samples of a tile's pixels, in the order in which they are taken.
+/// The kept samples of a tile's pixels, in the order in which they are taken.
 #[derive(Clone, Debug)]
 pub struct SampleTile {
     samples: Vec<KeptSample>,
@@ -93,12 +93,12 @@ pub struct SampleTile {
     pub(super) counts: SampleCounts,
 }
 
-/// Samples of a tile since the last edit.
+/// Counts of a tile's samples since the last edit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct SampleCounts {
-    /// Taken, and kept.
+    /// Samples that were taken and kept.
     pub taken: usize,
-    /// Found among those kept.
+    /// Samples that were reused from those kept.
     pub found: usize,
 }
 
@@ -115,17 +115,17 @@ impl Default for SampleTile {
 }
 
 impl SampleTile {
-    /// Samples kept.
+    /// Number of samples kept.
     pub fn len(&self) -> usize {
         self.samples.len()
     }
 
-    /// Bytes kept.
+    /// Size in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.samples[..]) + self.flight.bytes() + self.scatter.bytes()
     }
 
-    /// The `i`-th sample, unless it is to be taken.
+    /// The `i`-th sample; `None` if it must be taken.
     #[inline]
     pub fn get(&mut self, i: usize) -> Option<PixelSample> {
         let KeptSample { radiance, depth } = *self.samples.get(i)?;
@@ -141,7 +141,7 @@ impl SampleTile {
         })
     }
 
-    /// Keeps the `i`-th sample of a tile of so many pixels, in place of what was there or after all others.
+    /// Keeps the `i`-th sample of a tile of `pixels` pixels, replacing the old one or after all others.
     #[inline]
     pub(super) fn put(&mut self, i: usize, sample: &PixelSample, past: &Past, pixels: usize) {
         let depth = if sample.alpha > 0.0 { sample.depth } else { f32::NAN };
@@ -167,7 +167,7 @@ impl SampleTile {
         self.scatter.reserve(more);
     }
 
-    /// Gives up the samples that an edit touched.
+    /// Invalidates the samples that an edit touched.
     pub(super) fn ask(&mut self, query: &SampleQuery) {
         let SampleQuery { past: asked, behind } = query;
         for (i, sample) in self.samples.iter_mut().enumerate() {
@@ -179,7 +179,7 @@ impl SampleTile {
         self.counts = SampleCounts::default();
     }
 
-    /// How its samples differ from those of another time.
+    /// Differences to the samples at another time.
     pub fn compare(&self, other: &Self) -> ItemChanges {
         let pairs = self.samples.iter().zip(&other.samples);
         let differing = pairs.filter(|(a, b)| bytemuck::bytes_of(*a) != bytemuck::bytes_of(*b)).count();

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "PathSettings")]
 pub struct Settings {
-    /// MiB in which a session that edits the scene keeps the first samples of each pixel, 32 bytes for each, so that an edit
-    /// takes again those alone that it touched; 0 keeps none. It changes the speed, never the picture.
+    /// Memory, in MiB, in which a session that edits the scene keeps the first samples of each pixel, 32 bytes each, so
+    /// that an edit retakes only those that it touched; 0 keeps none. It affects the speed, never the picture.
     #[schemars(range(min = 0, max = 1_048_576))]
     pub history_memory: u32,
 }

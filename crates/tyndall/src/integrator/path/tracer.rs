@@ -1,4 +1,4 @@
-//! A camera path: from collision to collision, with light gathered at each.
+//! A camera path: it flies from collision to collision and samples light at each.
 
 use super::samples::{SampleKeeper, SampleTile};
 use crate::film::{Goal, PixelSample, Tile};
@@ -12,17 +12,18 @@ use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes};
 use std::ops::ControlFlow;
 
-/// Russian roulette begins below this throughput; at 1 every path survives with its throughput as probability. Against 1/4 this makes the same error in 0.75 (coloured cloud) to 1.02 (white cloud) of the time.
+/// Russian roulette starts below this throughput; at 1, the survival probability of every path is its throughput.
+/// Compared with 1/4, this reaches the same error in 0.75 (coloured cloud) to 1.02 (white cloud) of the time.
 const ROULETTE_WEIGHT: f32 = 1.0;
 
-/// Adds paths to the pixels of a tile until it has come as far as a goal, unless a stop comes first.
+/// Adds paths to the pixels of a tile until it reaches the goal, unless stopped first.
 pub(super) struct TracePixels<'a> {
     pub scene: &'a Scene,
     pub tile: &'a mut Tile,
-    /// A path that a stop left half done.
+    /// A path that a stop left unfinished.
     pub pending: &'a mut Option<CameraPath>,
     pub kept: &'a mut SampleTile,
-    /// `None` where no samples are kept.
+    /// `None` if no samples are kept.
     pub keeper: Option<&'a SampleKeeper>,
     pub goal: Goal,
     pub stop: &'a Stop<'a>,
@@ -64,13 +65,13 @@ impl Kernel for TracePixels<'_> {
     }
 }
 
-/// Listener to all that a path reads.
+/// Recorder of everything that a path reads.
 trait PathNotes: FlightNotes {
-    /// The optics of a value where light scatters.
+    /// Records a read of the optical properties of `value` where light scatters.
     fn scatters(&mut self, value: f32);
 }
 
-/// No listener.
+/// Records nothing.
 impl PathNotes for () {
     #[inline(always)]
     fn scatters(&mut self, _: f32) {}
@@ -99,18 +100,18 @@ impl Kernel for TraceOne<'_> {
     }
 }
 
-/// A path on its way.
+/// A path being traced.
 #[derive(Clone, Debug)]
 pub struct CameraPath {
     numbers: PathSampler,
     ray: Ray,
     throughput: Rgb,
-    /// Density of the ray's direction; none was drawn for the camera's own ray.
+    /// Pdf of the ray's direction; `None` for the camera ray, whose direction was not sampled by scattering.
     pdf: Option<f32>,
-    /// Scatterings so far.
+    /// Number of scatterings so far.
     order: u32,
     seen: PixelSample,
-    /// What it depends on, if that is noted.
+    /// What it depends on, if that is recorded.
     past: Past,
 }
 
@@ -127,7 +128,8 @@ impl CameraPath {
         Self::new(scene.camera.ray(scene.size, film, on_lens), numbers)
     }
 
-    /// Goes on to the path's end, or for one scattering at least when told to stop; gives whether it has ended.
+    /// Continues to the path's end, or until a stop, but for at least one scattering; returns whether the path has
+    /// ended.
     #[inline(always)]
     fn go_on<S: Lanes>(&mut self, simd: S, scene: &Scene, stop: &Stop, notes: &mut impl PathNotes) -> bool {
         while self.scatter(simd, scene, notes).is_continue() {
@@ -138,7 +140,7 @@ impl CameraPath {
         true
     }
 
-    /// Flies to the next collision, gathers light there and scatters; breaks where the path ends.
+    /// Flies to the next collision, samples light there and scatters; breaks if the path ends.
     #[inline(always)]
     fn scatter<S: Lanes>(&mut self, simd: S, scene: &Scene, notes: &mut impl PathNotes) -> ControlFlow<()> {
         let medium = &*scene.medium;
@@ -157,8 +159,8 @@ impl CameraPath {
             return ControlFlow::Break(());
         };
         let optics = medium.transfer().optics(collision.value);
-        // At the last order only emission is read. It decides how lights are chosen, and a path of any scattering has already
-        // sampled one, so that its history holds that dependence; only an order-0 path has not.
+        // At the last order only emission is read. Emission affects how lights are chosen. A path that has scattered
+        // has already sampled a light, so its history includes that dependence; a path of order 0 has not.
         if *order < scene.render.max_scatter || *order == 0 {
             notes.scatters(collision.value);
         }

@@ -1,4 +1,4 @@
-//! Which light paths, photons and segments an edit leaves valid.
+//! Which light paths, photons and segments remain valid after an edit.
 
 use super::stored::Photon;
 use super::{PhotonMapper, SegmentTile, marks_for, plan, step};
@@ -9,7 +9,8 @@ use crate::light::Light;
 use crate::scene::Scene;
 
 impl PhotonMapper {
-    /// Drops what an edit touched of paths, photons and segments, and nothing else; false where all is to begin anew.
+    /// Drops the paths, photons and segments that an edit touched, and nothing else; false if everything must be
+    /// recomputed.
     pub(super) fn keep_valid(&mut self, edit: &Edited, tiles: &mut [Option<SegmentTile>]) -> bool {
         let Edited { old, new, difference } = *edit;
         if difference.volume || difference.majorants || difference.clip || difference.seed {
@@ -23,7 +24,7 @@ impl PhotonMapper {
         }
         self.traced = 0;
         self.pass = None;
-        // With other steps, segments end elsewhere, and the widest slice of a beam is another.
+        // With a different step, segments end at other positions, and the widest slice of a beam changes.
         let steps = step(old, &self.settings) != step(new, &self.settings);
         if steps {
             self.marks = marks_for(new, &self.settings);
@@ -49,7 +50,7 @@ impl PhotonMapper {
         true
     }
 
-    /// Keeps the paths of lights that still send the same ones, whatever their index is now.
+    /// Keeps the paths of lights whose paths are unchanged, even if their index changed.
     fn update_lights(&mut self, scene: &Scene, glow: bool) {
         let sources = sources(scene);
         let plan = plan(scene, &self.settings, sources.len());
@@ -82,7 +83,7 @@ impl PhotonMapper {
                 }
             };
             if paths.count != plan.count {
-                // Every photon of it now stands for more light, or for less.
+                // Every photon of this light now carries more or less flux.
                 self.mark(&paths);
                 self.map.discard();
                 paths.set_count(&plan);
@@ -95,7 +96,7 @@ impl PhotonMapper {
         }
     }
 
-    /// Marks where all photons of a light are.
+    /// Marks the positions of all photons of a light.
     fn mark(&self, light: &LightPaths<Photon>) {
         light.chunks.iter().for_each(|chunk| self.marks.mark_all(chunk.vertices()));
     }

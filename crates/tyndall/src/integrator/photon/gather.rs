@@ -12,7 +12,7 @@ use fearless_simd::prelude::*;
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
 
-/// A gather: where, and towards which viewer.
+/// A gather: its position and viewing direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gathering {
     /// Index space.
@@ -22,15 +22,15 @@ pub(super) struct Gathering {
     pub event: Event,
     /// Towards the viewer.
     pub w_out: Vec3,
-    /// World units of the viewer's ray that the position stands for.
+    /// Length of the view ray that the position represents, world units.
     pub width: f32,
-    /// Of the ray in its packet.
+    /// The ray's lane in its packet.
     pub lane: usize,
 }
 
 impl PhotonMap {
-    /// Light from everywhere that a position scatters to a viewer, per unit extinction. `notes` is told of the values that are
-    /// read around the position.
+    /// Light from all directions that a position scatters to the viewer, per unit extinction. `notes` records the
+    /// values that are read around the position.
     #[inline(always)]
     pub fn scattered<S: Lanes>(
         &self,
@@ -54,7 +54,7 @@ impl PhotonMap {
         }
     }
 
-    /// The estimate over a region.
+    /// The estimate from the photons in a region.
     #[inline(always)]
     fn within<S: Lanes, R: GatherRegion>(
         &self,
@@ -67,7 +67,7 @@ impl PhotonMap {
         let (q, here) = (self.grid.to_metric(at.position), (at.position, at.opacity, at.lane));
         let index = self.grid.index_per_metric();
         let mut matter = Matter::about(simd, medium, here, index, &kernel, notes);
-        // World units over the mean free path.
+        // The radius in world units, divided by the mean free path.
         let thickness = self.radius * medium.density() * at.opacity;
         if let Some((axis, share)) = flat_skin(matter.lean, kernel.radius(), thickness) {
             kernel = kernel.flattened(axis, share);
@@ -99,7 +99,7 @@ impl PhotonMap {
             }
         }
         let light = sum.total() / (kernel.volume() * matter.opacity);
-        // In matter this thin the quotient overflows single precision, and nothing is visible.
+        // The quotient overflows single precision only in matter so thin that it is invisible.
         if light.to_array().iter().all(|x| x.is_finite()) { light } else { Rgb::BLACK }
     }
 
@@ -109,8 +109,8 @@ impl PhotonMap {
         [load(simd, &self.x, i) - q.x, load(simd, &self.y, i) - q.y, load(simd, &self.z, i) - q.z]
     }
 
-    /// Distance of the `count`-th nearest photon, at most the radius, in units of it. The estimate takes those nearer than that one, which
-    /// leaves it without bias where photons lie evenly.
+    /// Distance of the `count`-th nearest photon, at most the radius, in units of the radius. The estimate uses only
+    /// nearer photons, which makes it unbiased where photons are evenly distributed.
     #[inline(always)]
     fn radius_of<S: Lanes>(&self, simd: S, at: &Gathering, count: usize, distances: &mut Vec<f32>) -> f32 {
         let q = self.grid.to_metric(at.position);
@@ -132,7 +132,7 @@ impl PhotonMap {
             return 1.0;
         }
         let (_, nth, _) = distances.select_nth_unstable_by(count - 1, f32::total_cmp);
-        // Photons may lie on the very position; a sphere has some extent.
+        // Photons may be exactly at the position; a sphere must not be empty.
         nth.sqrt().max(1e-3)
     }
 }
@@ -144,14 +144,14 @@ fn number_of(position: Vec3) -> usize {
     position.to_array().into_iter().fold(0, mixed) as usize
 }
 
-/// Optical depth within which fluence falls about as its linear fit does.
+/// Optical depth over which fluence decreases approximately linearly.
 const MOST_THICK: f32 = 1.5;
 
-/// At a boundary of matter its mean position is off by at least this share of the radius.
+/// At a boundary of matter, the matter's mean position is displaced by at least this share of the radius.
 const LEAN_OF_SKIN: f32 = 0.1;
 
-/// Along which axis a gather is to be flattened, and to what share of its radius: at the skin of matter so dense that little
-/// light gets as deep as the radius. `thickness` is the optical depth of the map's radius.
+/// The axis along which a gather is flattened, and to what share of its radius: at the surface of matter so dense that
+/// little light penetrates as deep as the radius. `thickness` is the optical depth of the map's radius.
 #[inline(always)]
 fn flat_skin(lean: Vec3, radius: f32, thickness: f32) -> Option<(Vec3, f32)> {
     let thickness = thickness * radius;
@@ -168,7 +168,7 @@ fn load<S: Lanes>(simd: S, numbers: &[f32], i: usize) -> S::f32s {
     S::f32s::from_slice(simd, &numbers[i..i + S::WIDTH])
 }
 
-/// What photons add up to, each weighted by the scattering function.
+/// The sum over photons, each weighted by the scattering function.
 struct Sum<'a, S: Lanes> {
     simd: S,
     event: &'a Event,
@@ -182,9 +182,10 @@ struct Sum<'a, S: Lanes> {
 /// How a photon's weight depends on its direction.
 #[derive(Clone, Copy, Debug)]
 enum Scattering {
-    /// Not at all.
+    /// Not at all: isotropic scattering.
     Even,
-    /// By the phase function, and where there is a diffuse surface by the cosine to its side: share and normal.
+    /// By the phase function and, at a diffuse surface, by the cosine on the viewer's side: the surface's share and its
+    /// normal.
     Smooth(f32, Vec3),
     /// By any BRDF.
     Glossy,
@@ -220,7 +221,7 @@ impl<'a, S: Lanes> Sum<'a, S> {
                 let words = S::u32s::from_slice(simd, &map.directions[i..i + S::WIDTH]);
                 let [x, y, z] = unpack_directions(simd, words);
                 let phase = self.event.phase.eval_between_lanes(simd, [x, y, z], self.w_out) * (1.0 - q);
-                // Light travels against the direction to where it comes from.
+                // The incident direction is opposite to the photon's direction of travel.
                 let cos = (-(x * normal.x + y * normal.y + z * normal.z)).max(zero);
                 cos * (q * FRAC_1_PI) + phase
             }
@@ -235,7 +236,7 @@ impl<'a, S: Lanes> Sum<'a, S> {
         ];
     }
 
-    /// One by one.
+    /// Adds photons one by one.
     #[inline(always)]
     fn add_glossy(&mut self, map: &PhotonMap, first: usize, weights: S::f32s) {
         for (i, &weight) in (first..).zip(weights.as_slice()) {

@@ -8,42 +8,43 @@ use std::f32::consts::PI;
 
 /// A region of metric space around a position.
 pub(super) trait GatherRegion: Copy {
-    /// How far it reaches where it is not flattened: all round, or about a ray.
+    /// Radius before flattening, of a ball or about a ray.
     fn radius(&self) -> f32;
 
-    /// How far it reaches along each axis.
+    /// Half-extent along each coordinate axis.
     fn reach(&self) -> Vec3;
 
-    /// Product of the reaches along each pair of axes.
+    /// Symmetric matrix whose eigenvalues are the squared half-extents along the region's own axes.
     fn squared_reach(&self) -> Mat3;
 
-    /// In units of the radius cubed.
+    /// Volume, in units of the radius cubed.
     fn volume(&self) -> f32;
 
-    /// The same, but reaching along an axis no further than a share of the radius.
+    /// The same region, compressed along an axis to a share of the radius.
     fn flattened(self, axis: Vec3, share: f32) -> Self;
 
-    /// Whether it contains what lies so far from the position.
+    /// Whether it contains a point at the offset `apart` from the position.
     fn holds<S: Lanes>(&self, simd: S, apart: [S::f32s; 3]) -> S::mask32s;
 
-    /// Points spread evenly through it, opposite ones in pairs, from a number on: relative to the position.
+    /// Evenly distributed points in the region, from the `first` on, relative to the position; opposite points form
+    /// pairs.
     fn points<S: Lanes>(&self, simd: S, first: usize) -> [S::f32s; 3];
 }
 
-/// All within a radius: the point estimate \[Jensen98\].
+/// A ball: the point estimate \[Jensen98\].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ball<'a> {
     radius: f32,
     flat: Flat,
-    /// About the axis along which it is flattened.
+    /// A frame whose axis is that of flattening.
     frame: Frame,
-    /// By which points are turned.
+    /// Selects the rotation of the points.
     number: usize,
     points: &'a Points,
 }
 
 impl<'a> Ball<'a> {
-    /// With points that lie otherwise for each of some numbers, so that what they miss has no direction.
+    /// `number` selects a rotation of the points, so that their sampling error has no preferred direction.
     pub fn new(radius: f32, number: usize, points: &'a Points) -> Self {
         Self { radius, flat: Flat::ROUND, frame: points.turns[number % TURNS], number, points }
     }
@@ -86,25 +87,26 @@ impl GatherRegion for Ball<'_> {
     }
 }
 
-/// All that a piece of a ray passes within a radius: the beam radiance estimate \[Jarosz08\], piece by piece. Together the
-/// pieces make one beam.
+/// A cylinder about a piece of a ray: the beam radiance estimate \[Jarosz08\], piece by piece. Together the pieces form
+/// one beam.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slice<'a> {
-    /// Along the ray.
+    /// Length along the ray.
     width: f32,
     flat: Flat,
-    /// About the ray's direction; its first tangent is the axis along which the slice is flattened.
+    /// A frame about the ray's direction; its first tangent is the axis along which the slice is flattened.
     frame: Frame,
     points: &'a Points,
 }
 
 impl<'a> Slice<'a> {
-    /// With points that lie otherwise for each of some numbers.
+    /// `number` selects a rotation of the points.
     pub fn new(width: f32, direction: Vec3, number: usize, points: &'a Points) -> Self {
         Self { width, flat: Flat::ROUND, frame: points.turned(direction, number), points }
     }
 
-    /// How far one of this width reaches along an axis, whichever way its ray goes: to the rim of its ends.
+    /// Maximum half-extent along an axis of a slice of this width, whatever its ray's direction: the distance to the
+    /// rim of its ends.
     pub fn reach_of(width: f32) -> f32 {
         (1.0 + 0.25 * width.powi(2)).sqrt()
     }
@@ -131,7 +133,7 @@ impl GatherRegion for Slice<'_> {
 
     #[inline(always)]
     fn flattened(self, axis: Vec3, share: f32) -> Self {
-        // The cut of an ellipsoid across the ray.
+        // The cross-section of an ellipsoid perpendicular to the ray.
         let w = self.frame.w;
         let across = axis - w * axis.dot(w);
         let Some(u) = across.try_normalize() else { return self };
@@ -144,7 +146,7 @@ impl GatherRegion for Slice<'_> {
         let ([x, y, z], d) = (apart, self.frame.w);
         let along = x * d.x + y * d.y + z * d.z;
         let aside = x * x + y * y + z * z - along * along + self.flat.lost_squared(simd, apart);
-        // Half open, so that no photon counts in two pieces.
+        // Half-open, so that no photon counts in two pieces.
         let half = 0.5 * self.width;
         aside.simd_lt(S::f32s::splat(simd, 1.0))
             & along.simd_ge(S::f32s::splat(simd, -half))
@@ -158,24 +160,24 @@ impl GatherRegion for Slice<'_> {
     }
 }
 
-/// How a round part of space is pressed together along an axis.
+/// How a region is compressed along an axis.
 #[derive(Clone, Copy, Debug)]
 struct Flat {
-    /// Of length 1, unless nothing is pressed.
+    /// Of length 1, or zero if nothing is compressed.
     axis: Vec3,
-    /// How far it reaches along the axis over how far it reaches across.
+    /// Extent along the axis divided by extent across it.
     share: f32,
 }
 
 impl Flat {
     const ROUND: Self = Self { axis: Vec3::ZERO, share: 1.0 };
 
-    /// What it takes from the squared reach of a part of space of radius 1.
+    /// The reduction of the squared reach of a region of radius 1.
     fn lost(&self) -> Mat3 {
         square(self.axis) * (1.0 - self.share.powi(2))
     }
 
-    /// What it has taken from the squared length that a vector would have in the round.
+    /// The amount to add to a vector's squared length to get its squared length before compression.
     #[inline(always)]
     fn lost_squared<S: Lanes>(&self, simd: S, [x, y, z]: [S::f32s; 3]) -> S::f32s {
         let along = x * self.axis.x + y * self.axis.y + z * self.axis.z;
@@ -183,12 +185,12 @@ impl Flat {
     }
 }
 
-/// Products of a vector's coordinates.
+/// Outer product of a vector with itself.
 fn square(v: Vec3) -> Mat3 {
     Mat3::from_cols(v * v.x, v * v.y, v * v.z)
 }
 
-/// Points, from the `first` on, along axes.
+/// Points, from the `first` on, transformed to the given axes.
 #[inline(always)]
 fn placed<S: Lanes>(
     simd: S,
@@ -202,26 +204,27 @@ fn placed<S: Lanes>(
     [a * u.x + b * v.x + c * w.x, a * u.y + b * v.y + c * w.y, a * u.z + b * v.z + c * w.z]
 }
 
-/// Points of the unit ball, and of the cylinder of radius 1 from -1 to 1. Planes across the last axis of the ball, and across the
-/// first and the last of the cylinder, have as many points on one side as they have volume there, to half a point.
+/// Points in the unit ball, and in the cylinder of radius 1 from -1 to 1. For planes perpendicular to the last axis of
+/// the ball, or to the first or last axis of the cylinder, the number of points on each side is proportional to the
+/// volume there, to within half a point.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Points {
     ball: [[f32; MOST_LANES]; 3],
     cylinder: [[f32; MOST_LANES]; 3],
-    /// Turned this way and that, evenly.
+    /// Evenly distributed rotations.
     turns: [Frame; TURNS],
-    /// Sines and cosines of turns about an axis.
+    /// Sines and cosines of rotation angles about an axis.
     angles: [(f32, f32); TURNS],
 }
 
-/// Ways in which points are turned.
+/// Number of rotations of the points.
 const TURNS: usize = 64;
 
-/// In which order the points' distances from the axis go, by which their second moments are those of the whole.
+/// Order of the points' distances from the axis, chosen so that the points' second moments match those of the region.
 const ORDER_IN_BALL: [u8; MOST_LANES / 2] = [7, 1, 3, 5, 0, 2, 6, 4];
 const ORDER_IN_DISK: [u8; MOST_LANES / 2] = [1, 4, 7, 5, 3, 0, 6, 2];
 
-/// In which order the cylinder's points go along it.
+/// Order of the cylinder's points along its axis.
 const ORDER_ALONG: [u8; MOST_LANES / 2] = [0, 6, 4, 2, 5, 7, 3, 1];
 
 impl Points {
@@ -231,7 +234,7 @@ impl Points {
             ball: [[0.0; MOST_LANES]; 3],
             cylinder: [[0.0; MOST_LANES]; 3],
             turns: std::array::from_fn(|i| {
-                // An axis on a spiral, and an angle about it, both from steps that fill the square.
+                // An axis on a spiral and an angle about it, both from low-discrepancy sequences.
                 let z = 1.0 - (2 * i + 1) as f32 / TURNS as f32;
                 let (sin, cos) = angle(0.618_034 * i as f32);
                 let across = (1.0 - z * z).sqrt();
@@ -243,11 +246,12 @@ impl Points {
         for pair in 0..pairs {
             let share = |i: usize| (i as f32 + 0.5) / pairs as f32;
             let within = |order: [u8; MOST_LANES / 2]| share(usize::from(order[pair]));
-            // Between -c and c lie (3 c - c^3) / 2 of a ball: the root in trigonometric form.
+            // The fraction of a ball between -c and c is (3 c - c^3) / 2; this is the root in trigonometric form.
             let c = 2.0 * (share(pair).asin() / 3.0).sin();
             let (sin, cos) = (pair as f32 * PI * (3.0 - 5.0_f32.sqrt())).sin_cos();
             let aside = ((1.0 - c * c) * within(ORDER_IN_BALL)).sqrt();
-            // Between -sin(t) and sin(t) lie (2 t + sin(2 t)) / pi of a disk, which has no root in closed form.
+            // The fraction of a disk between -sin(t) and sin(t) is (2 t + sin(2 t)) / pi, which has no closed-form
+            // root: Newton's method.
             let mut t = 0.5 * PI * share(pair);
             for _ in 0..8 {
                 t -= (2.0 * t + (2.0 * t).sin() - PI * share(pair)) / (2.0 + 2.0 * (2.0 * t).cos());
@@ -266,7 +270,7 @@ impl Points {
         points
     }
 
-    /// A frame about an axis, turned in one of several ways.
+    /// A frame about an axis, rotated by one of several angles.
     fn turned(&self, axis: Vec3, number: usize) -> Frame {
         Frame::around(axis).turned(self.angles[number % TURNS])
     }
@@ -293,7 +297,7 @@ mod tests {
     #[test]
     fn points_stand_for_ball_and_cylinder() {
         let Points { ball, cylinder, .. } = Points::new();
-        // Mean squares along each axis of the whole; products across have none.
+        // Mean squares along each axis of the whole region; mixed products have mean 0.
         for (name, points, squares) in
             [("ball", ball, [0.2; 3]), ("cylinder", cylinder, [0.25, 0.25, 1.0 / 3.0])]
         {

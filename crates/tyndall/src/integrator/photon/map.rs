@@ -11,8 +11,8 @@ use crate::medium::Medium;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Interactions in the order of their cells, then of lights, paths and bounces, so that sums do not depend on what was
-/// traced when. Arrays end with room for a whole vector.
+/// Interactions sorted by cell, then by light, path and bounce, so that sums do not depend on when they were traced.
+/// Arrays are padded at the end by a whole vector.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PhotonMap {
     pub(super) grid: CellGrid,
@@ -25,27 +25,27 @@ pub(super) struct PhotonMap {
     pub(super) y: Vec<f32>,
     pub(super) z: Vec<f32>,
     pub(super) directions: Vec<u32>,
-    /// Flux, over density and radius cubed.
+    /// Flux divided by density and by the radius cubed.
     pub(super) red: Vec<f32>,
     pub(super) green: Vec<f32>,
     pub(super) blue: Vec<f32>,
-    /// One over the opacity where the photon is.
+    /// Reciprocal of the opacity at the photon's position.
     pub(super) per_opacity: Vec<f32>,
 }
 
 /// Bytes of a photon in the map, and of its sorting keys.
 pub(super) const BYTES: u64 = 32 + KEY_BYTES;
 
-/// Photons that are put into the map at once: some tenths of a millisecond's work.
+/// Photons that are written into the map at once: some tenths of a millisecond's work.
 const PIECE: usize = 1 << 12;
 
-/// The paths of one light, with what their photons' flux is to be multiplied by.
+/// Chunks of one light, with the factor for their photons' flux.
 pub(super) struct Lit<'a> {
     pub chunks: &'a [Chunk<Photon>],
     pub scale: DVec3,
 }
 
-/// What a map is made for.
+/// Parameters of a map.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MapSettings {
     pub grid: CellGrid,
@@ -54,7 +54,7 @@ pub(super) struct MapSettings {
     pub estimate: Estimator,
 }
 
-/// A map that is being made, piece by piece, so that a stop is heard soon and work goes on from there.
+/// A map being built, piece by piece, so that a stop takes effect soon and the work can be resumed.
 #[derive(Debug)]
 pub(super) struct MapInProgress {
     sort: CellSort,
@@ -62,7 +62,7 @@ pub(super) struct MapInProgress {
     filling: Option<Filling>,
 }
 
-/// Photons in order, of which some pieces are in the map.
+/// Sorted photons, and the map into which some pieces of them have been written.
 #[derive(Debug)]
 struct Filling {
     sorted: SortedItems,
@@ -70,10 +70,10 @@ struct Filling {
     filled: Vec<bool>,
 }
 
-/// A map, whether it is made or not.
+/// The states of a map.
 #[derive(Debug, Default)]
 pub(super) enum MapState {
-    /// Photons have changed since it was made, or it never was.
+    /// It was never built, or photons have changed since.
     #[default]
     Absent,
     InProgress(MapInProgress),
@@ -88,13 +88,19 @@ impl MapState {
         }
     }
 
-    /// Photons change.
+    /// Discards the map, because photons change.
     pub fn discard(&mut self) {
         *self = Self::Absent;
     }
 
-    /// Makes the map, or goes on with it; false if a stop came first. See [`MapInProgress::go_on`].
-    pub fn make(&mut self, medium: &Medium, settings: &MapSettings, lights: &[Lit], limits: &Limits) -> bool {
+    /// Builds the map, or continues to; false if stopped first. See [`MapInProgress::go_on`].
+    pub fn build(
+        &mut self,
+        medium: &Medium,
+        settings: &MapSettings,
+        lights: &[Lit],
+        limits: &Limits,
+    ) -> bool {
         if let Self::Absent = self {
             *self = Self::InProgress(MapInProgress::new(settings, lights));
         }
@@ -108,14 +114,13 @@ impl MapState {
 }
 
 impl MapInProgress {
-    /// Of the photons of all lights, which must not change until the map is made.
+    /// Starts a map of the photons of all lights, which must not change until it is complete.
     pub fn new(settings: &MapSettings, lights: &[Lit]) -> Self {
         let lengths = lights.iter().flat_map(|lit| lit.chunks).map(|chunk| chunk.vertices().len());
         Self { sort: CellSort::new(&settings.grid, lengths), filling: None }
     }
 
-    /// Goes on with it, in parallel on the current pool; `None` if a stop came first. Called with the same photons and settings each
-    /// time.
+    /// Continues, in parallel on the current pool; `None` if stopped first. Photons and settings must be the same in every call.
     pub fn go_on(
         &mut self,
         medium: &Medium,
@@ -142,7 +147,7 @@ impl MapInProgress {
 }
 
 impl PhotonMap {
-    /// A map with room for sorted photons, and for a whole vector after the last.
+    /// A map with room for the sorted photons, and for a whole vector after the last.
     fn with_room(&MapSettings { grid, radius, estimate }: &MapSettings, sorted: &SortedItems) -> Self {
         let room = sorted.len() + crate::medium::MOST_LANES;
         let zeros = || vec![0.0; room];
@@ -163,7 +168,7 @@ impl PhotonMap {
         }
     }
 
-    /// Puts photons where their order wants them, those pieces of them that are not yet there.
+    /// Writes the pieces of the sorted photons that are not `filled` yet.
     fn fill(
         &mut self,
         medium: &Medium,
@@ -210,12 +215,12 @@ impl PhotonMap {
             });
     }
 
-    /// Bytes kept.
+    /// Size in bytes.
     pub fn bytes(&self) -> usize {
         4 * 8 * self.x.len() + self.starts.bytes()
     }
 
-    /// The range of photons in the cells of a row, which lie side by side.
+    /// The range of photons in the cells of a row, which is contiguous.
     #[inline(always)]
     pub fn row(&self, xs: [usize; 2], y: usize, z: usize) -> Range<usize> {
         self.starts.row(&self.grid, xs, y, z)

@@ -1,13 +1,14 @@
-//! How much matter photons have met where they are gathered.
+//! How much matter there is where photons are gathered.
 //!
-//! Photons lie where light collides, also where it is then absorbed: their flux in a part of space estimates the integral of
-//! extinction times fluence over it. \[Jonsson12, eq. 8\] divides by the scattering at the position alone, which is wrong at
-//! every albedo but 1, and at the skin of matter, where half of the sphere holds none. Here fluence is taken to be linear
-//! about the position, `a + b x`, and fitted to the flux and its first moment, as local regression does at a border \[Fan92\]:
-//! with the moments `m0`, `m1`, `m2` of the extinction that is `a = sum (1 - c x) flux / (m0 - c m1)`, `c = m2^-1 m1`.
+//! Photons are stored at every collision, including those where light is then absorbed: their flux in a region
+//! estimates the integral of extinction times fluence over it. \[Jonsson12, eq. 8\] divides only by the scattering at
+//! the position, which is wrong for every albedo except 1, and at the surface of matter, where half of the sphere is
+//! empty. Here fluence is assumed to be linear about the position, `a + b x`, and fitted to the flux and its first
+//! moment, as in local regression at a boundary \[Fan92\]: with the moments `m0`, `m1`, `m2` of the extinction,
+//! `a = sum (1 - c x) flux / (m0 - c m1)`, `c = m2^-1 m1`.
 //!
-//! Matter denser than the position counts as dense as the position, and its photons for so much less: else what the points miss of a
-//! dense neighbour, and the flux there, would light up all the thin matter about it.
+//! Matter denser than at the position counts as if it had the density at the position, and its photons are scaled down
+//! accordingly. Otherwise a dense neighbour that the points miss would light up all the thin matter around it.
 
 use super::kernel::GatherRegion;
 use crate::math::{Mat3, Vec3};
@@ -15,29 +16,31 @@ use crate::medium::{MOST_LANES, MarchNotes, Medium};
 use crate::simd::Lanes;
 use fearless_simd::prelude::*;
 
-/// Share of the flux that the slope may take away at most: at a flat skin it takes 0.7. More of it would leave noise.
+/// Maximum share of the flux that the slope may remove: at a flat surface it removes 0.7. Removing more would leave
+/// noise.
 const MOST_LEAN: f32 = 0.75;
 
-/// Second moment added along each axis, as a share of the opacity times the squared reach, so that thin sheets have an
-/// inverse.
+/// Second moment added along each axis, as a share of the opacity times the squared reach, so that the matrix is
+/// invertible for thin sheets.
 const LEAST_SPREAD: f32 = 0.02;
 
 /// Matter thinner than this scatters nothing that single precision can represent.
 const LEAST_OPACITY: f32 = 1e-30;
 
-/// Weights of photons by the fit to moments.
+/// Weights of photons from the fit to moments.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Matter {
-    /// Opacity by which the weighted flux is to be divided.
+    /// Opacity by which to divide the weighted flux.
     pub opacity: f32,
-    /// A photon's weight falls by so much per radius.
+    /// Decrease of a photon's weight per radius.
     pub slope: Vec3,
-    /// Mean position of matter relative to the query, in metric space.
+    /// Mean position of matter relative to the gather, in metric space.
     pub lean: Vec3,
 }
 
 impl Matter {
-    /// About a position of index space, whose own opacity is given and positive; `to_index` takes metric vectors to index space.
+    /// About a position in index space with opacity `own`, which is positive; `to_index` transforms metric vectors to
+    /// index space.
     #[inline(always)]
     pub fn about<S: Lanes>(
         simd: S,
@@ -72,12 +75,12 @@ impl Matter {
             (xy, xz, yz) = (ox.mul_add(y, xy), ox.mul_add(z, xz), oy.mul_add(z, yz));
             first += S::WIDTH;
         }
-        // The position itself is one of the points: there is matter, but for rounding.
+        // The position itself counts as one of the points, so there is matter, up to rounding.
         let mean = (total(sum.as_slice()) + own) / (MOST_LANES + 1) as f32;
         if mean < LEAST_OPACITY {
             return Self { opacity: 0.0, slope: Vec3::ZERO, lean: Vec3::ZERO };
         }
-        // Over the mean, which may be small, and its powers smaller than any number.
+        // Divided by the mean, since the mean may be small and its powers would underflow.
         let per_mean = 1.0 / (mean * (MOST_LANES + 1) as f32);
         let moment = |lanes: &[f32]| total(lanes) * per_mean;
         let lean = Vec3::new(moment(sx.as_slice()), moment(sy.as_slice()), moment(sz.as_slice()));

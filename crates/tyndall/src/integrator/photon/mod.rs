@@ -1,13 +1,13 @@
 //! Photon mapping that survives edits \[Jonsson12\].
 //!
-//! Light paths leave photons where they interact with matter (`paths`), sorted by position (`map`); rays from the camera gather
-//! them, in segments (`segments`). Path and segment know the data values that they read, as a Historygram, so that an
-//! edit of the transfer function redoes those alone that read what it changed. Where photons changed is known too
-//! (`spatial`), for the segments that gather there.
+//! Light paths store photons where they interact with matter (`light_paths`); photons are sorted by position (`map`),
+//! and camera rays gather them, in segments (`segments`). Each path and segment records the data values that it read in
+//! a Historygram, so that an edit of the transfer function recomputes only those that read changed values. The
+//! positions of changed photons are recorded too (`cells::ChangeMarks`), for the segments that gather there.
 //!
-//! All is plain data in flat arrays, and everything follows from scene and numbers: what is redone comes out as it would
-//! from nothing, bit for bit. The first sample of every pixel is this *base map*; later ones are refinement passes with
-//! photons of their own and a shrinking radius \[Knaus11\], and start anew after an edit.
+//! Everything is plain data in flat arrays, determined by the scene and the random numbers: a result after an edit
+//! equals that of a new session, bit for bit. The first sample of every pixel uses this *base map*; later ones are
+//! refinement passes with their own photons and a shrinking radius \[Knaus11\], which restart after an edit.
 
 mod edit;
 mod gather;
@@ -42,27 +42,27 @@ use std::any::Any;
 use stored::Photon;
 use view::View;
 
-/// Light paths, photons, and what edits changed since; segments are kept with their tiles.
+/// Light paths, photons, and marks of what edits have changed; segments are kept with their tiles.
 #[derive(Debug)]
 pub struct PhotonMapper {
     settings: Settings,
     ground: Ground,
     lights: Vec<LightPaths<Photon>>,
-    /// Of the base map.
+    /// The base map.
     map: MapState,
-    /// Where photons changed since the segments last asked.
+    /// Where photons have changed since segments were last invalidated.
     marks: ChangeMarks,
-    /// Whether there may be segments that an edit leaves valid.
+    /// Whether there may be segments that an edit can leave valid.
     has_segments: bool,
-    /// The refinement pass that is being made or used.
+    /// The current refinement pass.
     pass: Option<Pass>,
-    /// Paths traced since the last edit.
+    /// Number of paths traced since the last edit.
     traced: usize,
 }
 
 impl PhotonMapper {
-    /// Bytes that photons and segments take at most, but for chance: with every path as long as it may
-    /// be, and a refinement pass beside the base map.
+    /// Maximum size in bytes of photons and segments, up to random variation: with every path at its maximum length,
+    /// and a refinement pass in addition to the base map.
     fn most_bytes(settings: &Settings, max_scatter: u32, size: [u32; 2]) -> u64 {
         let history = u64::from(settings.history_bits).div_ceil(8);
         let photon = size_of::<Photon>() as u64 + map::BYTES;
@@ -72,17 +72,17 @@ impl PhotonMapper {
         crate::math::cast::whole(paths).saturating_add(segments.saturating_mul(segments::BYTES + history))
     }
 
-    /// Photons of the base map, once it is made.
+    /// Number of photons of the base map, once traced.
     fn photons(&self) -> usize {
         self.lights.iter().flat_map(|light| &light.chunks).map(|chunk| chunk.vertices().len()).sum()
     }
 
-    /// Light paths.
+    /// Number of light paths.
     fn paths(&self) -> usize {
         self.lights.iter().map(|light| light.count as usize).sum()
     }
 
-    /// What is kept for edits to come beside segments.
+    /// What is kept for future edits besides segments.
     fn kept_paths(&self) -> [KeptCount; 3] {
         let chunks = || self.lights.iter().flat_map(|light| &light.chunks);
         let bytes = |of: fn(ChunkBytes) -> usize| chunks().map(|chunk| of(chunk.bytes())).sum();
@@ -102,7 +102,7 @@ impl Method for PhotonMapper {
         "Photon mapping whose photons and view rays survive edits that do not touch them.";
 
     type Settings = Settings;
-    /// The segments of the tile's view rays, once there are any.
+    /// The segments of the tile's view rays, once computed.
     type TileState = Option<SegmentTile>;
 
     fn check(settings: &Settings) -> Result<(), SettingProblem> {
@@ -128,7 +128,7 @@ impl Method for PhotonMapper {
     fn notes(settings: &Settings, _: &Scene) -> Vec<&'static str> {
         match settings.spatial {
             SpatialHistory::Off => vec![
-                "with `spatial = \"off\"` edits leave light where it was: the picture is not the one from nothing",
+                "with `spatial = \"off\"` edits leave outdated light: the picture differs from a full recomputation",
             ],
             SpatialHistory::Cells | SpatialHistory::Axes => Vec::new(),
         }
@@ -143,11 +143,11 @@ impl Method for PhotonMapper {
                 "{} light paths of up to {max_scatter} scatterings and {} segments a pixel",
                 settings.photons, settings.segments
             ),
-            mend: "fewer of them",
+            fix: "fewer of them",
         })
     }
 
-    /// The paths of a scene, in parallel on the current pool; nothing is traced yet.
+    /// Creates the paths of a scene, in parallel on the current pool; nothing is traced yet.
     fn new(scene: &Scene, settings: &Settings, resources: &Resources) -> Self {
         let medium = &*scene.medium;
         let reading = Reading::new(medium, settings.groups(), settings.grouping());
@@ -168,7 +168,7 @@ impl Method for PhotonMapper {
     }
 
     fn is_touched_by(&self, difference: &Difference) -> bool {
-        // Cells decide which numbers tracking draws, and names which numbers a light's paths draw.
+        // Majorant cells determine which random numbers tracking uses, and names those of a light's paths.
         let numbers = difference.majorants || difference.seed || difference.lights.names;
         difference.view() || difference.light() || numbers
     }
@@ -182,7 +182,7 @@ impl Method for PhotonMapper {
         tiles.iter_mut().flatten().for_each(|tile| tile.computed = SegmentCounts::default());
     }
 
-    /// Prepares the photons for a sample, those of the base map for the first; false if a stop came first.
+    /// Prepares the photons for a sample; the first sample uses the base map. False if stopped first.
     fn prepare(&mut self, scene: &Scene, sample: u32, limits: &Limits) -> bool {
         if scene.render.max_scatter == 0 {
             return true;
@@ -202,7 +202,7 @@ impl Method for PhotonMapper {
             self.map.discard();
         }
         let radius = self.settings.radius;
-        if !done.finished || !make_map(&mut self.map, scene, radius, &self.settings, &self.lights, limits) {
+        if !done.finished || !build_map(&mut self.map, scene, radius, &self.settings, &self.lights, limits) {
             return false;
         }
         self.has_segments = true;
@@ -260,7 +260,7 @@ impl Method for PhotonMapper {
     }
 }
 
-/// The paths of the base map from each of so many sources.
+/// The plan for the base map's paths from each of `sources` sources.
 fn plan(scene: &Scene, settings: &Settings, sources: usize) -> Plan {
     Plan {
         count: Plan::share(settings.photons, sources),
@@ -274,8 +274,8 @@ fn plan(scene: &Scene, settings: &Settings, sources: usize) -> Plan {
     }
 }
 
-/// Step of a view ray in world units: short enough that attenuation within a step of the densest matter is small, with a lower
-/// bound.
+/// Step of a view ray in world units: short enough that attenuation within a step in the densest matter is small, with
+/// a lower bound.
 fn step(scene: &Scene, settings: &Settings) -> f32 {
     const THICKEST: f32 = 0.5;
     const SHORTEST: f32 = 1.0 / 16.0;
@@ -288,19 +288,19 @@ fn cells_for(scene: &Scene, settings: &Settings, radius: f32) -> CellGrid {
     let grid = scene.medium.volume().grid();
     let radius = radius * grid.voxel_size();
     let reach = match settings.estimator() {
-        // As wide as a step at least.
+        // At least as wide as a step.
         Estimator::Beam => Slice::reach_of((step(scene, settings) / radius).max(settings.gather_spacing)),
         Estimator::Point | Estimator::Nearest(_) => 1.0,
     };
     CellGrid::new(grid, radius, reach)
 }
 
-/// Marks of changed photons, in the map's own cells: a gather sums photons cell by cell, so that even a photon outside its radius
-/// can change its last bit.
+/// Empty marks for changed photons, in the map's own cells: a gather sums photons cell by cell, so that even a photon
+/// outside its radius can change its last bit.
 fn marks_for(scene: &Scene, settings: &Settings) -> ChangeMarks {
     let medium = &*scene.medium;
     let grid = cells_for(scene, settings, settings.radius);
-    // Past this number of changed photons, few segments gather none of them.
+    // Above this number of changed photons, almost every segment gathers some of them.
     let enough = settings.photons as usize / 2;
     match settings.spatial {
         SpatialHistory::Off => ChangeMarks::off(),
@@ -311,14 +311,14 @@ fn marks_for(scene: &Scene, settings: &Settings) -> ChangeMarks {
     }
 }
 
-/// Light paths and view-ray segments at one time.
+/// Light paths and view-ray segments at one point in time.
 struct KeptLight {
     lights: Vec<LightPaths<Photon>>,
     tiles: Vec<Option<SegmentTile>>,
 }
 
 impl KeptLight {
-    /// Paths that were other ones in another session's lights, or were not there.
+    /// Number of paths that differ in `lights`, or do not exist there.
     fn paths_differing(&self, lights: &[LightPaths<Photon>]) -> usize {
         let of_light = |light: &LightPaths<Photon>| {
             let same = lights.iter().find(|other| other.stream == light.stream);
@@ -349,8 +349,8 @@ impl KeptItems for KeptLight {
     }
 }
 
-/// Sorts the photons of all lights into a map that is not ready yet; `radius` in voxels. False if a stop came first.
-fn make_map(
+/// Sorts the photons of all lights into a map, unless it is ready; `radius` in voxels. False if stopped first.
+fn build_map(
     map: &mut MapState,
     scene: &Scene,
     radius: f32,
@@ -364,7 +364,7 @@ fn make_map(
     let voxel = scene.medium.volume().grid().voxel_size();
     let grid = cells_for(scene, settings, radius);
     let settings = MapSettings { grid, radius: radius * voxel, estimate: settings.estimator() };
-    // In double precision, since world units may be anything.
+    // In double precision, since world units may have any scale.
     let per_volume = f64::from(settings.radius).powi(3).recip() / f64::from(scene.medium.density());
     let scale = |light: &LightPaths<Photon>| {
         let [r, g, b] = light.color().to_array().map(f64::from);
@@ -372,5 +372,5 @@ fn make_map(
     };
     let lit: Vec<Lit> =
         lights.iter().map(|light| Lit { chunks: &light.chunks, scale: scale(light) }).collect();
-    map.make(&scene.medium, &settings, &lit, limits)
+    map.build(&scene.medium, &settings, &lit, limits)
 }

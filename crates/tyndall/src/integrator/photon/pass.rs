@@ -1,10 +1,10 @@
-//! Refinement passes: photons and rays of their own, which make the picture converge \[Knaus11\].
+//! Refinement passes: each has its own photons and rays, so that the picture converges \[Knaus11\].
 
 use super::map::MapState;
 use super::settings::Settings;
 use super::stored::Photon;
 use super::view::{Stretches, View};
-use super::{make_map, plan};
+use super::{build_map, plan};
 use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::cells::ChangeMarks;
 use crate::integrator::light_paths::{Ground, HistoryDetail, LightPaths, Plan, Tracing, sources};
@@ -18,7 +18,7 @@ use crate::simd::{Kernel, Lanes};
 pub(super) struct Pass {
     pub number: u32,
     settings: Settings,
-    /// Voxels.
+    /// In voxels.
     radius: f32,
     lights: Vec<LightPaths<Photon>>,
     pub map: MapState,
@@ -27,7 +27,7 @@ pub(super) struct Pass {
 /// Trade-off between variance and bias of successive passes, between 0 and 1: the value that \[Knaus11\] found best.
 const ALPHA: f64 = 2.0 / 3.0;
 
-/// Radius of a pass over that of the base map: volumes shrink as `(i + alpha) / (i + 1)` \[Knaus11\].
+/// Radius of a pass divided by that of the base map: volumes shrink by `(i + alpha) / (i + 1)` per pass \[Knaus11\].
 fn shrunk(pass: u32) -> f32 {
     let volume: f64 = (1..=pass).map(|i| (f64::from(i) + ALPHA) / (f64::from(i) + 1.0)).product();
     crate::math::cast::single(volume.cbrt())
@@ -49,23 +49,24 @@ impl Pass {
         }
     }
 
-    /// Traces and sorts the photons; false where a stop came first.
+    /// Traces and sorts the photons; false if stopped first.
     pub fn prepare(&mut self, scene: &Scene, ground: &Ground, limits: &Limits) -> bool {
         if self.map.ready().is_some() {
             return true;
         }
         let marks = ChangeMarks::off();
         let tracing = Tracing { scene, ground, pass: self.number, marks: &marks, limits };
-        let made = tracing.trace(&mut self.lights).finished
-            && make_map(&mut self.map, scene, self.radius, &self.settings, &self.lights, limits);
-        if made {
+        let built = tracing.trace(&mut self.lights).finished
+            && build_map(&mut self.map, scene, self.radius, &self.settings, &self.lights, limits);
+        if built {
             self.lights = Vec::new();
         }
-        made
+        built
     }
 }
 
-/// Takes samples of the pixels of a tile, on the way to a goal, along jittered rays with jittered steps, unless a stop comes first.
+/// Takes samples of the pixels of a tile until it reaches the goal, along jittered rays with jittered steps, unless stopped
+/// first.
 pub(super) struct GatherPass<'a> {
     pub view: View<'a>,
     pub tile: &'a mut Tile,
@@ -120,7 +121,7 @@ mod tests {
     #[test]
     fn radii_shrink_to_nothing_but_slower_than_the_photons_grow() {
         assert_eq!(shrunk(0), 1.0);
-        // The product of (i + a) / (i + 1) falls as n^(a - 1): by 1000^(-1/9) in the radius.
+        // The product of (i + a) / (i + 1) decreases as n^(a - 1): a factor of 1000^(-1/9) in the radius.
         let ratio = shrunk(100_000) / shrunk(100);
         assert!((ratio - 1000_f32.powf(-1.0 / 9.0)).abs() < 1e-3, "{ratio}");
     }

@@ -1,4 +1,4 @@
-//! View rays in segments, each by itself computed, kept and found invalid \[Jonsson12, sec. 4.3.2\].
+//! View rays divided into segments, each computed, kept and invalidated independently \[Jonsson12, sec. 4.3.2\].
 
 use super::view::{Notes, Stretch, Stretches, View};
 use crate::film::{Goal, PixelSample, Tile};
@@ -16,33 +16,33 @@ use bytemuck::{Pod, Zeroable};
 /// The segments of a tile's pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SegmentTile {
-    /// Segments of each ray.
+    /// Number of segments per ray.
     per_ray: usize,
     segments: Vec<Segment>,
     /// Values that each segment read.
     histories: PackedHistories,
-    /// Values that have changed since the segments were last asked, unless there was no edit.
+    /// Values that have changed since the segments were last invalidated; `None` without an edit.
     changed: Option<Historygram>,
     pub(super) computed: SegmentCounts,
 }
 
-/// What was done since the last edit.
+/// Work done since the last edit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct SegmentCounts {
-    /// Segments computed.
+    /// Number of segments computed.
     pub segments: usize,
-    /// Positions in them where photons were gathered.
+    /// Number of positions in them where photons were gathered.
     pub gathers: usize,
 }
 
-/// What a segment shows. How much passes it and where it lies are as good as exact in 16 bits, its light in no less than 32.
+/// The result of a segment. 16 bits suffice for transmittance and depth; radiance needs 32.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 struct Segment {
     radiance: [f32; 3],
-    /// Transmittance, in shares of [`WHOLE`].
+    /// Transmittance, in units of 1 / [`WHOLE`].
     transmittance: u16,
-    /// Where on average what it covers lies, in shares of [`WHOLE`] of its length.
+    /// Mean position of the visible matter along the segment, in units of 1 / [`WHOLE`] of its length.
     depth: u16,
 }
 
@@ -53,11 +53,11 @@ pub(super) const BYTES: u64 = size_of::<Segment>() as u64;
 const WHOLE: u16 = u16::MAX - 1;
 
 impl Segment {
-    /// None is known.
+    /// Not yet computed, or invalidated.
     const UNKNOWN: Self = Self { radiance: [0.0; 3], transmittance: u16::MAX, depth: 0 };
     const CLEAR: Self = Self { radiance: [0.0; 3], transmittance: WHOLE, depth: 0 };
 
-    /// A stretch from one distance to another.
+    /// From the results of a stretch between two distances.
     fn new(found: &Stretch, [from, to]: [f32; 2]) -> Self {
         let covered = 1.0 - found.transmittance;
         let along = if covered > 0.0 { (found.depth / covered - from) / (to - from) } else { 0.0 };
@@ -77,14 +77,14 @@ impl Segment {
         f32::from(self.transmittance) / f32::from(WHOLE)
     }
 
-    /// Between the distances where it begins and ends.
+    /// The mean depth as a distance, given those where the segment begins and ends.
     fn distance(&self, [from, to]: [f32; 2]) -> f32 {
         from + (to - from) * (f32::from(self.depth) / f32::from(WHOLE))
     }
 }
 
 impl SegmentTile {
-    /// For so many pixels, nothing known yet.
+    /// For this many pixels, nothing known yet.
     pub fn new(pixels: usize, per_ray: usize, groups: u8) -> Self {
         let count = pixels * per_ray;
         Self {
@@ -96,17 +96,18 @@ impl SegmentTile {
         }
     }
 
-    /// Segments in it.
+    /// Number of segments.
     pub fn len(&self) -> usize {
         self.segments.len()
     }
 
-    /// Bytes kept.
+    /// Size in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.segments[..]) + self.histories.bytes()
     }
 
-    /// How its known segments differ from those known at another time; with another number of segments all are new.
+    /// Differences between its known segments and those known at another time; all are new if the number of segments
+    /// differs.
     pub fn compare(&self, other: &Self) -> ItemChanges {
         if self.len() != other.len() {
             return ItemChanges { differing: 0, new: self.len() };
@@ -124,18 +125,18 @@ impl SegmentTile {
         changes
     }
 
-    /// Notes which values an edit changed; photons may have changed anywhere.
+    /// Records which values an edit changed; photons may have changed anywhere.
     pub fn add_change(&mut self, values: Historygram) {
         self.changed = Some(self.changed.unwrap_or_default() | values);
         self.computed = SegmentCounts::default();
     }
 
-    /// Whether all changes have been asked for.
+    /// Whether all recorded changes have been applied.
     pub fn is_settled(&self) -> bool {
         self.changed.is_none()
     }
 
-    /// Forgets the segments that changes touch.
+    /// Invalidates the segments that the recorded changes touch.
     fn invalidate(&mut self, view: &View, tile: &Tile, positions: &ChangeMarks) {
         let Some(changed) = self.changed.take() else { return };
         if !changed.is_empty() {
@@ -157,7 +158,7 @@ impl SegmentTile {
         }
     }
 
-    /// The first segment of a ray that shows and is not known; `None` if there is none.
+    /// The first segment of a ray that is visible but not known; `None` if there is none.
     fn missing(&self, ray: usize) -> Option<usize> {
         let mut transmittance = 1.0;
         for segment in 0..self.per_ray {
@@ -173,7 +174,7 @@ impl SegmentTile {
         None
     }
 
-    /// A ray's segments put together, front to back.
+    /// Composites a ray's segments front to back.
     fn composite(&self, view: &View, ray: usize, (world, track): &(Ray, Track)) -> PixelSample {
         let (mut radiance, mut transmittance, mut depth) = (Rgb::BLACK, 1.0_f32, 0.0);
         let count = track.steps(view.step);
@@ -184,7 +185,7 @@ impl SegmentTile {
             let distance = segment.distance(ends(steps_of(number, self.per_ray, count), view.step));
             depth += distance * (transmittance - behind);
             transmittance = behind;
-            // What lies behind does not show, and may be out of date.
+            // Segments behind are not visible, and may be out of date.
             if transmittance < OPAQUE {
                 break;
             }
@@ -199,7 +200,7 @@ impl SegmentTile {
     }
 }
 
-/// The steps of a ray that a segment has: the segments share them evenly.
+/// The range of a segment's steps: a ray's steps are divided evenly among its segments.
 fn steps_of(segment: usize, per_ray: usize, count: i32) -> [i32; 2] {
     let border = |segment: usize| {
         let steps = i64::from(count) * segment as i64 / per_ray as i64;
@@ -208,7 +209,7 @@ fn steps_of(segment: usize, per_ray: usize, count: i32) -> [i32; 2] {
     [border(segment), border(segment + 1)]
 }
 
-/// Where steps of a length begin and end, in units of it along the track.
+/// The distances along the track at which a range of steps begins and ends.
 fn ends(steps: [i32; 2], step: f32) -> [f32; 2] {
     steps.map(|k| k as f32 * step)
 }
@@ -219,21 +220,21 @@ fn segment_of(step: i32, per_ray: usize, count: i32) -> usize {
     usize::try_from(number).unwrap_or(0).min(per_ray - 1)
 }
 
-/// Share of a gather that is due at the beginning of a segment: even over neighbouring pixels and segments, by a lattice of
-/// irrational steps.
+/// Fraction of a gather due at the beginning of a segment: evenly distributed over neighbouring pixels and segments, by
+/// a lattice of irrational steps.
 fn due_in([x, y]: [u32; 2], segment: usize) -> f32 {
     let along = cast::fit_u32(segment).wrapping_mul(0x9e37_79b9);
     let turn = x.wrapping_mul(0xc13f_a9a9).wrapping_add(y.wrapping_mul(0x91e1_0da5)).wrapping_add(along);
     (turn >> 8) as f32 / (1 << 24) as f32
 }
 
-/// The ray of a pixel's segments, through its middle and the lens's.
+/// The ray of a pixel's segments, through the middle of the pixel and of the lens.
 fn ray_of(scene: &Scene, [x, y]: [u32; 2]) -> (Ray, Track) {
     let ray = scene.camera.ray(scene.size, [x as f32 + 0.5, y as f32 + 0.5], [0.5; 2]);
     (ray, scene.medium.track(&ray, f32::INFINITY))
 }
 
-/// Forgets the segments of a ray that gather where photons changed.
+/// Invalidates the segments of a ray that gather where photons changed.
 fn forget_near(view: &View, pixel: [u32; 2], positions: &ChangeMarks, segments: &mut [Segment]) {
     let medium = &*view.scene.medium;
     let (_, track) = ray_of(view.scene, pixel);
@@ -243,7 +244,7 @@ fn forget_near(view: &View, pixel: [u32; 2], positions: &ChangeMarks, segments: 
         if cell.most <= 0.0 || !positions.near_cell(cell.cell) {
             continue;
         }
-        // One step more on either side, since the border is subject to rounding.
+        // One extra step on either side, since the border is subject to rounding.
         let first = cast::truncate(cell.start / view.step - 1.5).max(0);
         let last = cast::truncate(cell.end / view.step + 0.5).min(count - 1);
         for k in first..=last {
@@ -255,8 +256,8 @@ fn forget_near(view: &View, pixel: [u32; 2], positions: &ChangeMarks, segments: 
     }
 }
 
-/// Computes the segments that show and are not known of the pixels of a tile that a goal includes, and gives each of these
-/// pixels its sample, unless a stop comes first.
+/// Computes the segments that are visible but not known, of the pixels of a tile that the goal includes, and adds a sample to
+/// each of these pixels, unless stopped first.
 pub(super) struct GatherSegments<'a> {
     pub view: View<'a>,
     pub segments: &'a mut SegmentTile,
@@ -280,12 +281,12 @@ impl Kernel for GatherSegments<'_> {
         let rays: Vec<(Ray, Track)> = pixels.iter().map(|&pixel| ray_of(view.scene, pixel)).collect();
         for (ray, (_, track)) in turn.clone().zip(&rays) {
             if track.steps(view.step) == 0 {
-                // Past the volume.
+                // The ray misses the volume.
                 let segments = &mut segments.segments[ray * segments.per_ray..(ray + 1) * segments.per_ray];
                 segments.fill(Segment::CLEAR);
             }
         }
-        // Rays that lack segments, and those that still do after a packet's turn, in the order of the pixels.
+        // Rays with missing segments, in pixel order; each round computes one segment per ray.
         let mut lacking: Vec<usize> = turn.clone().filter(|&ray| segments.missing(ray).is_some()).collect();
         while !lacking.is_empty() {
             for packet in lacking.chunks(S::WIDTH) {
@@ -331,7 +332,7 @@ mod tests {
         for transmittance in [0.0, 1e-5, 0.3, 0.999, 1.0] {
             for middle in [20.0, 21.7, 30.0] {
                 let covered = 1.0 - transmittance;
-                // Brighter than half-precision numbers are.
+                // Brighter than half precision can represent.
                 let radiance = Rgb::new(1e6, 0.0, 70_000.0);
                 let found = Stretch { radiance, transmittance, depth: covered * middle, gathers: 1 };
                 let segment = Segment::new(&found, [20.0, 30.0]);

@@ -9,15 +9,16 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "PhotonSettings")]
 pub struct Settings {
-    /// Light paths that start, of all lights together.
+    /// Number of light paths started, over all lights.
     #[schemars(range(min = 1, max = 268_435_456))]
     pub photons: u32,
 
-    /// Radius within which light is gathered: larger is smoother, and blurs. A sphere in world space, whatever the spacing.
+    /// Radius within which photons are gathered: a larger one smooths but blurs. A sphere in world space, whatever the
+    /// spacing.
     #[schemars(range(min = 0.01, max = 1000))]
     pub radius: f32,
 
-    /// Parts of each view ray that an edit leaves or redoes by themselves.
+    /// Number of parts into which each view ray is divided; an edit keeps or recomputes each part independently.
     #[schemars(range(min = 1, max = 256))]
     pub segments: u32,
 
@@ -25,28 +26,28 @@ pub struct Settings {
     #[schemars(range(min = 0.1, max = 100))]
     pub steps_per_voxel: f32,
 
-    /// Radii between gathers along a view ray at most; 0 gathers at every step.
+    /// Maximum distance between gathers along a view ray, in radii; 0 gathers at every step.
     #[schemars(range(min = 0, max = 4))]
     pub gather_spacing: f32,
 
     /// How light is estimated from photons.
     pub estimate: Estimate,
 
-    /// Photons that the estimate `nearest` takes, as far as so many lie within the radius.
+    /// Number of photons that the estimate `nearest` uses, if that many are within the radius.
     #[schemars(range(min = 2, max = 65_536))]
     pub nearest: u32,
 
     /// Which part of a light path has a history of its own.
     pub histories: Histories,
 
-    /// Bits of a Historygram: 32, 64 or 128 groups of data values that an edit is told apart by.
+    /// Bits of a Historygram: 32, 64 or 128 groups of data values by which edits are distinguished.
     #[schemars(range(min = 32, max = 128))]
     pub history_bits: u32,
 
-    /// How data values are put into these groups.
+    /// How data values are divided into these groups.
     pub bins: HistoryBins,
 
-    /// How a part of a view ray learns that photons near it changed.
+    /// How a part of a view ray finds out that photons near it changed.
     pub spatial: SpatialHistory,
 }
 
@@ -69,12 +70,12 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Groups of values in a Historygram.
+    /// Number of groups of values in a Historygram.
     pub(super) fn groups(&self) -> u8 {
         u8::try_from(self.history_bits).unwrap_or(128)
     }
 
-    /// How values are put into them.
+    /// How values are divided into groups.
     pub(super) fn grouping(&self) -> Grouping {
         match self.bins {
             HistoryBins::Quantile => Grouping::Quantile,
@@ -99,9 +100,9 @@ pub enum Estimate {
     /// By all photons within the radius of a point.
     #[default]
     Point,
-    /// By the nearest photons, `nearest` of them; blurs less where there are many.
+    /// By the `nearest` nearest photons; blurs less where there are many.
     Nearest,
-    /// By all photons within the radius of the view ray: blurs nothing along it.
+    /// By all photons within the radius of the view ray: no blur along the ray.
     Beam,
 }
 
@@ -109,43 +110,43 @@ pub enum Estimate {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Histories {
-    /// Each interaction: an edit retraces a path from where it touched it.
+    /// Each interaction: an edit retraces a path from the first interaction that it touched.
     #[default]
     Interactions,
-    /// The path as a whole: less memory, but a touched path is retraced from its beginning.
+    /// The path as a whole: less memory, but a touched path is retraced from the beginning.
     Paths,
 }
 
-/// How data values are put into groups that an edit is told apart by.
+/// How data values are divided into groups by which edits are distinguished.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum HistoryBins {
-    /// Groups that hold equally many voxels, as far as that goes.
+    /// Groups with as nearly equal numbers of voxels as possible.
     #[default]
     Quantile,
-    /// Groups equally wide.
+    /// Groups of equal width.
     Uniform,
 }
 
-/// How a part of a view ray learns that photons near it changed.
+/// How a part of a view ray finds out that photons near it changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum SpatialHistory {
     /// A bit for each cell of the photon map: exact.
     #[default]
     Cells,
-    /// 64 bits along each axis: exact, but soon everything counts as changed.
+    /// 64 bits per axis: also exact, but soon everything counts as changed.
     Axes,
-    /// Not at all: parts that an edit does not touch keep the light that they had, which is wrong.
+    /// Not at all: parts that an edit does not touch keep their old light, which is wrong.
     Off,
 }
 
-/// [`Estimate`] with what it needs.
+/// [`Estimate`] with its parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Estimator {
     /// By all photons within the radius.
     Point,
-    /// By so many nearest ones, within the radius at most.
+    /// By this many nearest photons, at most those within the radius.
     Nearest(u32),
     /// By all photons within the radius of the ray \[Jarosz08\].
     Beam,

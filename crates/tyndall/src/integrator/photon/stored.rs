@@ -1,17 +1,17 @@
-//! Photons: what a light path leaves where it interacts with matter.
+//! Photons: what a light path stores where it interacts with matter.
 
 use crate::integrator::cells::Positioned;
 use crate::integrator::light_paths::{Arrival, Vertex};
 use crate::math::{PackedDirection, Rgb, Vec3};
 use bytemuck::{Pod, Zeroable};
 
-/// Light that arrives where it interacts with matter.
+/// Light that arrives at an interaction with matter.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Photon {
     /// Index space.
     position: [f32; 3],
-    /// In which it travels.
+    /// The direction in which the light travels.
     pub(super) direction: PackedDirection,
     /// As [`Vertex::flux`].
     pub(super) flux: [f32; 3],

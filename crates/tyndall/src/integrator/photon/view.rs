@@ -11,19 +11,19 @@ use crate::transfer::{HistoryGroups, Historygram};
 use crate::volume::ValueBins;
 use fearless_simd::prelude::*;
 
-/// Most opacity that a ray accumulates between two gathers, unless the spacing of the settings is reached first: so little that one
-/// gather represents all of it.
+/// Maximum opacity that a ray accumulates between two gathers, unless the settings' gather spacing is reached first: so
+/// little that one gather represents all of it.
 const MOST_COVERED: f32 = 1.0 / 16.0;
 
-/// Inputs of viewing.
+/// Inputs for computing view rays.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View<'a> {
     pub scene: &'a Scene,
-    /// `None` where nothing scatters.
+    /// `None` if nothing scatters.
     pub map: Option<&'a PhotonMap>,
     /// World units.
     pub step: f32,
-    /// Radii between two gathers at most.
+    /// Maximum distance between two gathers, in radii.
     pub gather_spacing: f32,
 }
 
@@ -35,7 +35,8 @@ pub(super) struct Stretches {
     /// First step and the one after the last; lanes without a stretch have none.
     pub from: [i32; MOST_LANES],
     pub to: [i32; MOST_LANES],
-    /// Fraction of a gather due at the beginning, below 1. Spread evenly over rays, these fractions cause no bias.
+    /// Fraction of a gather due at the beginning, below 1. Uniformly distributed over rays, these fractions cause no
+    /// bias.
     pub due: [f32; MOST_LANES],
 }
 
@@ -51,19 +52,20 @@ impl Default for Stretches {
     }
 }
 
-/// What a stretch of a ray shows by itself.
+/// The result of a stretch of a ray on its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Stretch {
     pub radiance: Rgb,
     pub transmittance: f32,
-    /// Sum of the distances inside the medium, weighted by what they cover.
+    /// Sum of the sample distances inside the medium, weighted by each sample's share of the opacity.
     pub depth: f32,
     /// Number of gathers on it.
     pub gathers: usize,
 }
 
 impl View<'_> {
-    /// Marches all stretches to their ends, or to where they are opaque. What a lane finds does not depend on the others.
+    /// Marches all stretches to their ends, or until they are opaque. A lane's result does not depend on the other
+    /// lanes.
     #[inline(always)]
     pub fn march<S: Lanes, N: MarchNotes<S>>(
         &self,
@@ -115,17 +117,17 @@ impl View<'_> {
     }
 }
 
-/// Gathers photons along view rays, as often as it pays, and adds what matter emits.
+/// Gathers photons along view rays, as often as [`MOST_COVERED`] and `spacing` require, and adds emission.
 struct GatheringShader<'a, S: Lanes> {
     view: &'a View<'a>,
     rays: &'a [Ray; MOST_LANES],
     radiance: [Rgb; MOST_LANES],
     gathers: [usize; MOST_LANES],
-    /// Share of a gather that is due.
+    /// Fraction of a gather that is due.
     due: S::f32s,
-    /// World units between two gathers at most.
+    /// Maximum distance between two gathers, world units.
     spacing: f32,
-    /// For gathers that sort.
+    /// Scratch space for gathers of the nearest photons.
     distances: Vec<f32>,
 }
 
@@ -136,14 +138,14 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
         let medium = &*self.view.scene.medium;
         if medium.transfer().emits() {
             for (lane, radiance) in self.radiance.iter_mut().enumerate().take(S::WIDTH) {
-                // Lanes that take no sample may have any value.
+                // Lanes without a sample may have any value.
                 let covered = covered.as_slice()[lane];
                 if covered > 0.0 {
                     *radiance += medium.transfer().emitted(sample.value.as_slice()[lane]) * covered;
                 }
             }
         }
-        // Gathers that a step is to have, at most one.
+        // Number of gathers for a step, at most one.
         let share = (covered * (1.0 / MOST_COVERED)).max(sample.width / self.spacing).min(one);
         let due = covered.simd_gt(zero).select(self.due + share, self.due);
         let now = due.simd_ge(one);
@@ -175,7 +177,7 @@ struct ViewSample {
     /// Index space.
     position: Vec3,
     value: f32,
-    /// World units of the ray that it stands for.
+    /// Length of the ray that it represents, world units.
     width: f32,
     w_out: Vec3,
     lane: usize,
@@ -185,7 +187,7 @@ struct ViewSample {
 pub(super) struct Notes<'a> {
     pub groups: &'a HistoryGroups,
     pub bins: ValueBins,
-    /// Of each majorant cell the groups of values that it can yield.
+    /// For each majorant cell, the groups of values that can occur in it.
     pub cells: &'a [Historygram],
     pub read: [Historygram; MOST_LANES],
 }

@@ -1,5 +1,5 @@
-//! The least that a method can be, for tests: every ray sees a colour, and the matter nothing. All that a new method needs is in
-//! this folder and in its line of the list of methods.
+//! A minimal method, for tests: every ray sees a constant colour, and the matter is ignored. This folder and a line in
+//! the list of methods are all that a new method needs.
 
 use super::{Method, Resources, Stop};
 use crate::film::{Goal, PixelSample, Tile};
@@ -24,12 +24,12 @@ impl Default for Settings {
     }
 }
 
-/// Shows the radiance of its settings, brighter where the camera looks up.
+/// Shows the radiance from the settings, brighter where the camera looks up.
 pub struct Plain(Rgb);
 
 impl Method for Plain {
     const NAME: &'static str = "plain";
-    const ABOUT: &'static str = "A colour without matter, for tests.";
+    const ABOUT: &'static str = "A constant colour that ignores the matter, for tests.";
     const HAS_NOISE: bool = false;
 
     type Settings = Settings;

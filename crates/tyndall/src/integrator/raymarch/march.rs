@@ -1,4 +1,4 @@
-//! The march along packets of view rays, and shadow rays from where they meet matter.
+//! Marching along packets of view rays, with shadow rays from positions in matter.
 
 use super::Settings;
 use crate::film::{Goal, PixelSample, Tile};
@@ -11,18 +11,18 @@ use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes, Level};
 use fearless_simd::prelude::*;
 
-/// The ray marcher with its fixed points on lights.
+/// The ray marcher with its fixed sample points on lights.
 #[derive(Clone, Debug)]
 pub struct RayMarch {
     /// World units.
     step: f32,
-    /// In the unit square, the same for every shaded point.
+    /// Points in the unit square, the same for every shaded position.
     light_points: Vec<[f32; 2]>,
     level: Level,
 }
 
 impl RayMarch {
-    /// Of a scene, with these vector instructions.
+    /// For a scene, with these vector instructions.
     #[must_use]
     pub fn of_scene(scene: &Scene, settings: &Settings, level: Level) -> Self {
         let Settings { step, light_samples } = *settings;
@@ -30,7 +30,7 @@ impl RayMarch {
         Self { step: step * scene.medium.volume().grid().voxel_size(), light_points, level }
     }
 
-    /// Adds rays to the pixels of a tile until it has come as far as a goal; see [`crate::integrator::Method::refine`].
+    /// Adds rays to the pixels of a tile until it reaches the goal; see [`crate::integrator::Method::refine`].
     pub(super) fn refine_tile(
         &self,
         scene: &Scene,
@@ -48,18 +48,19 @@ impl RayMarch {
         self.level.run(MarchOne { raymarch: self, scene, packet: Packet::new(scene, [*ray].into_iter()) })
     }
 
-    /// A pixel's `sample`-th ray. Samples serve the pixel filter and the lens alone; the first goes
-    /// through the pixel's middle.
+    /// A pixel's `sample`-th ray. Samples vary only the position in the pixel and on the lens; the first goes through
+    /// the middle of the pixel.
     fn ray(scene: &Scene, [x, y]: [u32; 2], sample: u32) -> Ray {
         let [in_x, in_y] = spread(sample);
         let film = [x as f32 + in_x, y as f32 + in_y];
-        // The lens point walks its own lattice, turned per pixel so that blur becomes grain, not ghosts.
+        // Lens points have their own lattice, shifted per pixel so that defocus shows as grain, not as ghost images.
         let [turn_x, turn_y] = spread(y.wrapping_mul(7919).wrapping_add(x));
         let [u, v] = spread(sample.wrapping_mul(3));
         scene.camera.ray(scene.size, film, [(u + turn_x).fract(), (v + turn_y).fract()])
     }
 
-    /// Marches a packet to its end, or for one shaded point at least when told to stop; gives whether it has ended.
+    /// Marches a packet to its end, or until a stop, but for at least one shaded position; returns whether it has
+    /// ended.
     #[inline(always)]
     fn go_on<S: Lanes>(&self, simd: S, scene: &Scene, packet: &mut Packet, stop: &Stop) -> bool {
         let mut seen = Coverage {
@@ -74,7 +75,7 @@ impl RayMarch {
         stopped.is_none()
     }
 
-    /// What a point adds to a ray that goes along `w_out`, per unit of extinction.
+    /// Radiance that a position adds in direction `w_out`, per unit extinction.
     #[inline(always)]
     fn source<S: Lanes>(&self, simd: S, scene: &Scene, position: Vec3, value: f32, w_out: Vec3) -> Rgb {
         let medium = &*scene.medium;
@@ -83,7 +84,7 @@ impl RayMarch {
         optics.emitted() + self.direct(simd, scene, &medium.event(position, &optics), here, w_out)
     }
 
-    /// Light from every lamp that a point scatters to `w_out`, per unit extinction.
+    /// Light from all lights that a position scatters in direction `w_out`, per unit extinction.
     #[inline(always)]
     fn direct<S: Lanes>(&self, simd: S, scene: &Scene, event: &Event, here: Vec3, w_out: Vec3) -> Rgb {
         let medium = &*scene.medium;
@@ -106,13 +107,13 @@ impl RayMarch {
     }
 }
 
-/// Adds what matter emits and what it scatters of the lights to a packet's rays.
+/// Adds emission and singly scattered light to a packet's rays.
 struct DirectShader<'a> {
     raymarch: &'a RayMarch,
     scene: &'a Scene,
     packet: &'a mut Packet,
     stop: &'a Stop<'a>,
-    /// Whether a point has been shaded since the march resumed, so that it makes progress however often it is stopped.
+    /// Whether a position has been shaded since the march resumed; ensures progress however often it is stopped.
     moved: bool,
 }
 
@@ -128,7 +129,7 @@ impl<S: Lanes> Shader<S, ()> for DirectShader<'_> {
                     continue;
                 }
                 if *moved && stop.reached() {
-                    // The same sample comes again, of which some lanes are shaded already.
+                    // The march resumes with this sample, of which some lanes are already shaded.
                     packet.shaded = lane;
                     return false;
                 }
@@ -161,13 +162,13 @@ pub struct Packet {
     count: usize,
     rays: [Ray; MOST_LANES],
     tracks: [Track; MOST_LANES],
-    /// The step to go on with.
+    /// The step at which to resume.
     k: [i32; MOST_LANES],
-    /// Lanes whose point at that step has been shaded already.
+    /// Number of lanes whose position at that step has already been shaded.
     shaded: usize,
     radiance: [Rgb; MOST_LANES],
     alpha: [f32; MOST_LANES],
-    /// Sum of the distances inside the medium, weighted by what they add to `alpha`.
+    /// Sum of the sample distances inside the medium, weighted by what each sample adds to `alpha`.
     depth: [f32; MOST_LANES],
 }
 
@@ -191,7 +192,7 @@ impl Packet {
         packet
     }
 
-    /// Where the march stands, and what it has met.
+    /// Stores the current step and the coverage so far.
     #[inline(always)]
     fn keep<S: Lanes>(&mut self, k: S::i32s, seen: &Coverage<S>) {
         k.store_slice(&mut self.k[..S::WIDTH]);
@@ -199,7 +200,7 @@ impl Packet {
         seen.depth.store_slice(&mut self.depth[..S::WIDTH]);
     }
 
-    /// What a ray has found in the end.
+    /// The result of a finished ray.
     fn sample(&self, scene: &Scene, lane: usize) -> PixelSample {
         let (alpha, direction) = (self.alpha[lane], self.rays[lane].direction);
         let distance = self.depth[lane] + alpha * self.tracks[lane].distance(0.0);
@@ -267,9 +268,9 @@ fn hammersley(i: u32, n: u32) -> [f32; 2] {
     [(i as f32 + 0.5) / n as f32, radical_inverse + 0.5 / n as f32 % 1.0]
 }
 
-/// The `i`-th point of the R2 sequence \[Roberts18\], which begins in the middle of the unit square.
+/// The `i`-th point of the R2 sequence \[Roberts18\], which starts in the middle of the unit square.
 fn spread(i: u32) -> [f32; 2] {
-    // Inverse powers of the plastic number, as fractions of 2^32, so that no bit is lost for large i.
+    // Inverse powers of the plastic number, as fractions of 2^32, so that no bits are lost for large i.
     let at = |step: u32| (i.wrapping_mul(step).wrapping_add(1 << 31) >> 8) as f32 / (1 << 24) as f32;
     [at(0xC13F_A9A9), at(0x91E1_0DA6)]
 }

@@ -1,7 +1,7 @@
 //! Emission, absorption and single scattering by marching along the view ray, with shadow rays to
-//! every light: the fast, flat, deterministic picture.
+//! every light: fast and deterministic, but flat.
 //!
-//! Light that glowing matter sends to other matter is left out.
+//! Light from glowing matter that other matter scatters is left out.
 
 mod march;
 mod settings;
@@ -20,7 +20,7 @@ impl Method for RayMarch {
     const HAS_NOISE: bool = false;
 
     type Settings = Settings;
-    /// A packet that a stop left half done.
+    /// A packet that a stop left unfinished.
     type TileState = Option<Box<Packet>>;
 
     fn draft(settings: &Settings) -> Settings {
@@ -30,7 +30,7 @@ impl Method for RayMarch {
     fn notes(_: &Settings, scene: &Scene) -> Vec<&'static str> {
         if scene.medium.transfer().emits() {
             vec![
-                "`raymarch` leaves out the light that glowing matter sends to other matter; the default method has it",
+                "`raymarch` leaves out light from glowing matter that other matter scatters; the default method includes it",
             ]
         } else {
             Vec::new()
@@ -42,7 +42,7 @@ impl Method for RayMarch {
     }
 
     fn is_touched_by(&self, difference: &Difference) -> bool {
-        // Cells decide in which order a march sums its samples.
+        // Majorant cells determine the order in which a march sums its samples.
         difference.view() || difference.light() || difference.majorants
     }
 

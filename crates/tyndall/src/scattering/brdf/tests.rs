@@ -166,7 +166,7 @@ fn samplers_follow_their_densities() {
             let n = deflect(Vec3::Z, 1.0 - degrees.to_radians().cos(), 0.1);
             let known = n * (2.0 * n.z) - Vec3::Z;
             let test =
-                ChiSquare { samples: 200_000, rows: 256, columns: 16, ..ChiSquare::of(2 * trials.len()) };
+                ChiSquare { samples: 200_000, rows: 256, columns: 16, ..ChiSquare::among(2 * trials.len()) };
             let fit = test.directions(
                 |u| brdf.sample(walk, n, known, surface, u).map(|w| w.to_array()),
                 |w| f64::from(brdf.pdf(walk, n, known, Vec3::from_array(w), surface)),

@@ -150,7 +150,7 @@ mod tests {
                 if phase.eval(0.0) * 4.0 * PI < least {
                     continue;
                 }
-                let test = ChiSquare { samples: 200_000, ..ChiSquare::of(2 * kinds.len()) };
+                let test = ChiSquare { samples: 200_000, ..ChiSquare::among(2 * kinds.len()) };
                 let fit = test.directions(
                     |u| Some(phase.sample(w, u).to_array()),
                     |after| f64::from(phase.eval_between(w, Vec3::from_array(after))),

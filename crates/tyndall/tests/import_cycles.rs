@@ -1,11 +1,11 @@
-//! No file of a folder imports one that imports it: what two files need has an owner below both. Read are the `use` lines of
-//! all crates; a folder's `mod.rs` and its files naturally know each other and do not count.
+//! The files of a folder form no import cycle: code that two of them need belongs in a file below both.
+//! Checks the `use` lines of all crates; a folder's `mod.rs` and its files naturally import each other and are exempt.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// File to the files beside it that it imports, by their module names.
+/// From each file to the files of the same folder that it imports, by module name.
 type Graph = BTreeMap<String, BTreeSet<String>>;
 
 fn folders(folder: &Path) -> Vec<PathBuf> {
@@ -18,7 +18,7 @@ fn folders(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The modules of a folder, files and folders alike, but for its own.
+/// The modules in a folder, files and folders alike, except its own module.
 fn modules(folder: &Path) -> Vec<(String, PathBuf)> {
     let entries = fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
     let module = |path: PathBuf| {
@@ -29,7 +29,7 @@ fn modules(folder: &Path) -> Vec<(String, PathBuf)> {
     entries.filter_map(module).collect()
 }
 
-/// The code of a module before its tests: a file's, or of all files of a folder.
+/// The code of a module before its tests: that of one file, or of all files of a folder.
 fn code(path: &Path) -> String {
     if path.is_dir() {
         let inside = fs::read_dir(path).expect("a folder").map(|entry| entry.expect("an entry").path());
@@ -45,7 +45,7 @@ fn code(path: &Path) -> String {
         .fold(String::new(), |all, line| all + line + "\n")
 }
 
-/// Names that follow `prefix` in code, those in braces one by one: `super::a`, `super::{b, c::D}`.
+/// Names that follow `prefix` in code, each name in braces separately: `super::a`, `super::{b, c::D}`.
 fn named(code: &str, prefix: &str) -> BTreeSet<String> {
     let word =
         |text: &str| -> String { text.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect() };
@@ -94,15 +94,15 @@ fn graph(src: &Path, folder: &Path) -> Graph {
         (name.clone(), used)
     };
     let mut graph = Graph::new();
-    // A file and the folder of its name are one module.
+    // A file and the folder of the same name are one module.
     for (name, used) in modules.iter().map(imports) {
         graph.entry(name).or_default().extend(used);
     }
     graph
 }
 
-/// A circle of imports, if there is one.
-fn circle(graph: &Graph) -> Option<Vec<String>> {
+/// A cycle of imports, if there is one.
+fn cycle(graph: &Graph) -> Option<Vec<String>> {
     fn visit(
         graph: &Graph,
         at: &str,
@@ -127,29 +127,27 @@ fn circle(graph: &Graph) -> Option<Vec<String>> {
 #[test]
 fn imports_between_files_of_a_folder_run_one_way() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let (mut imports, mut circles) = (0, Vec::new());
+    let (mut imports, mut cycles) = (0, Vec::new());
     for entry in fs::read_dir(&crates).expect("the crates") {
         let src = entry.expect("an entry").path().join("src");
         for folder in folders(&src) {
             let graph = graph(&src, &folder);
             imports += graph.values().map(BTreeSet::len).sum::<usize>();
-            circles.extend(
-                circle(&graph).map(|circle| format!("{}: {}", folder.display(), circle.join(" -> "))),
-            );
+            cycles.extend(cycle(&graph).map(|cycle| format!("{}: {}", folder.display(), cycle.join(" -> "))));
         }
     }
-    assert!(circles.is_empty(), "{circles:#?}");
-    assert!(imports > 200, "only {imports} imports were seen: the test reads nothing");
+    assert!(cycles.is_empty(), "{cycles:#?}");
+    assert!(imports > 200, "only {imports} imports were found: the test checks nothing");
 }
 
 #[test]
-fn circles_are_found_and_names_in_braces_are_read() {
+fn cycles_are_found_and_names_in_braces_are_read() {
     let of = |pairs: &[(&str, &[&str])]| -> Graph {
         let set = |names: &[&str]| names.iter().map(ToString::to_string).collect();
         pairs.iter().map(|(name, used)| (name.to_string(), set(used))).collect()
     };
-    assert_eq!(circle(&of(&[("a", &["b"]), ("b", &["c"]), ("c", &[])])), None);
-    let found = circle(&of(&[("a", &["b"]), ("b", &["c"]), ("c", &["b"])])).expect("a circle");
+    assert_eq!(cycle(&of(&[("a", &["b"]), ("b", &["c"]), ("c", &[])])), None);
+    let found = cycle(&of(&[("a", &["b"]), ("b", &["c"]), ("c", &["b"])])).expect("a cycle");
     assert_eq!(found, ["b", "c"]);
     let names = named("use super::{a, b::{C, D}, e::F};\nuse super::g::H;", "super::");
     assert_eq!(names.into_iter().collect::<Vec<_>>(), ["a", "b", "e", "g"]);
