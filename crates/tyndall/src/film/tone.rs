@@ -3,6 +3,7 @@
 //! A curve is for display only; the film records linear radiance.
 
 use crate::math::Rgb;
+use crate::simd::MOST_LANES;
 use crate::simd::{Kernel, Lanes, Level, exp2_unfused, log2_unfused};
 use fearless_simd::prelude::*;
 use std::ops::{Add, Div, Mul};
@@ -88,20 +89,22 @@ impl<C: Code> Kernel for Encode<'_, C> {
     fn run<S: Lanes>(self, simd: S) {
         let Self { curve, gain, pixels, codes } = self;
         for (pixels, codes) in pixels.chunks(S::WIDTH).zip(codes.chunks_mut(S::WIDTH)) {
-            // Lanes beyond the last pixel repeat it.
-            let scene = [0, 1, 2].map(|channel| {
-                let of = |lane: usize| pixels[lane.min(pixels.len() - 1)][channel];
-                clip(simd, S::f32s::from_fn(simd, of) * gain, BRIGHTEST)
-            });
+            // Lanes beyond the last pixel are black.
+            let mut linear = [[0.0; MOST_LANES]; 3];
+            for (lane, [r, g, b]) in pixels.iter().enumerate() {
+                (linear[0][lane], linear[1][lane], linear[2][lane]) = (*r * gain, *g * gain, *b * gain);
+            }
+            let r = clip(simd, S::f32s::from_slice(simd, &linear[0][..S::WIDTH]), BRIGHTEST);
+            let g = clip(simd, S::f32s::from_slice(simd, &linear[1][..S::WIDTH]), BRIGHTEST);
+            let b = clip(simd, S::f32s::from_slice(simd, &linear[2][..S::WIDTH]), BRIGHTEST);
             let shown = match curve {
-                ToneCurve::Agx => agx(simd, scene),
-                ToneCurve::Linear => scene.map(|x| encode_lanes(simd, x)),
+                ToneCurve::Agx => agx(simd, [r, g, b]),
+                ToneCurve::Linear => encode_all(simd, [r, g, b]),
                 ToneCurve::Reinhard => {
-                    let [r, g, b] = scene;
-                    let luminance = r * RED + g * GREEN + b * BLUE;
-                    scene.map(|x| encode_lanes(simd, x / (luminance + 1.0)))
+                    let white = r * RED + g * GREEN + b * BLUE + 1.0;
+                    encode_all(simd, [r / white, g / white, b / white])
                 }
-                ToneCurve::Aces => scene.map(|x| encode_lanes(simd, aces(x))),
+                ToneCurve::Aces => encode_all(simd, [aces(r), aces(g), aces(b)]),
             };
             for (channel, shown) in shown.into_iter().enumerate() {
                 let levels: S::i32s = (shown * 255.0 + 0.5).to_int();
@@ -147,6 +150,11 @@ fn encode_lanes<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
     x.simd_le(linear).select(x * 12.92, root * 1.055 - 0.055).min(1.0)
 }
 
+#[inline(always)]
+fn encode_all<S: Lanes>(simd: S, [r, g, b]: [S::f32s; 3]) -> [S::f32s; 3] {
+    [encode_lanes(simd, r), encode_lanes(simd, g), encode_lanes(simd, b)]
+}
+
 /// \[Narkowicz16\]: five numbers fitted to the reference and output device transforms.
 #[inline(always)]
 fn aces<V: Copy + Mul<f32, Output = V> + Mul<V, Output = V> + Add<f32, Output = V> + Div<V, Output = V>>(
@@ -189,12 +197,17 @@ const fn rows_to_one(rows: Matrix) -> Matrix {
 /// \[Wrensch23\]'s fit of the base look of \[Sobotka22\]; the output is already encoded for the display.
 #[inline(always)]
 fn agx<S: Lanes>(simd: S, scene: [S::f32s; 3]) -> [S::f32s; 3] {
+    let [r, g, b] = multiply(AGX_INSET, scene);
+    let [r, g, b] = multiply(AGX_OUTSET, [agx_of(simd, r), agx_of(simd, g), agx_of(simd, b)]);
+    [clip(simd, r, 1.0), clip(simd, g, 1.0), clip(simd, b, 1.0)]
+}
+
+/// One channel between the two matrices.
+#[inline(always)]
+fn agx_of<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
     let [low, high] = AGX_STOPS;
-    let contrast = |x: S::f32s| {
-        let log = log2_unfused(simd, x.max(f32::MIN_POSITIVE)).max(low).min(high);
-        agx_contrast((log - low) * (1.0 / (high - low)))
-    };
-    multiply(AGX_OUTSET, multiply(AGX_INSET, scene).map(contrast)).map(|x| clip(simd, x, 1.0))
+    let log = log2_unfused(simd, x.max(f32::MIN_POSITIVE)).max(low).min(high);
+    agx_contrast((log - low) * (1.0 / (high - low)))
 }
 
 /// The sigmoid over the log range, as a polynomial of degree 6 \[Wrensch23\].
@@ -206,7 +219,8 @@ fn agx_contrast<V: Copy + Mul<f32, Output = V> + Mul<V, Output = V> + Add<f32, O
 
 #[inline(always)]
 fn multiply<V: Copy + Mul<f32, Output = V> + Add<V, Output = V>>(rows: Matrix, [r, g, b]: [V; 3]) -> [V; 3] {
-    rows.map(|[x, y, z]| r * x + g * y + b * z)
+    let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = rows;
+    [r * ax + g * ay + b * az, r * bx + g * by + b * bz, r * cx + g * cy + b * cz]
 }
 
 #[cfg(test)]

@@ -15,6 +15,9 @@ use fearless_simd as simd;
 use std::fmt;
 use std::str::FromStr;
 
+/// Maximum number of lanes of any level.
+pub(crate) const MOST_LANES: usize = 16;
+
 /// A set of vector instructions that this processor has.
 #[derive(Clone, Copy)]
 pub struct Level(Token);

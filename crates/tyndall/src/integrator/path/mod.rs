@@ -78,7 +78,7 @@ impl Method for PathTracer {
         let Some(query) = self.keeper.as_mut().and_then(|keeper| keeper.update(edit)) else { return false };
         tiles.par_iter_mut().for_each(|tile| {
             tile.pending = None;
-            tile.samples.ask(&query);
+            tile.samples.ask(query);
         });
         true
     }

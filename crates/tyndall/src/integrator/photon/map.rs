@@ -149,7 +149,7 @@ impl MapInProgress {
 impl PhotonMap {
     /// A map with room for the sorted photons, and for a whole vector after the last.
     fn with_room(&MapSettings { grid, radius, estimate }: &MapSettings, sorted: &SortedItems) -> Self {
-        let room = sorted.len() + crate::medium::MOST_LANES;
+        let room = sorted.len() + crate::simd::MOST_LANES;
         let zeros = || vec![0.0; room];
         Self {
             radius,

@@ -7,9 +7,9 @@ use crate::integrator::history::PackedHistories;
 use crate::integrator::view_march::OPAQUE;
 use crate::integrator::{ItemChanges, Stop};
 use crate::math::{Ray, Rgb, cast};
-use crate::medium::{MOST_LANES, Track};
+use crate::medium::Track;
 use crate::scene::Scene;
-use crate::simd::{Kernel, Lanes};
+use crate::simd::{Kernel, Lanes, MOST_LANES};
 use crate::transfer::{HistoryGroups, Historygram};
 use bytemuck::{Pod, Zeroable};
 

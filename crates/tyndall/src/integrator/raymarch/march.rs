@@ -5,10 +5,10 @@ use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::Stop;
 use crate::integrator::view_march::{Coverage, OPAQUE, Shader, composite};
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::{MOST_LANES, PacketMarch, PacketSample, Track};
+use crate::medium::{PacketMarch, PacketSample, Track};
 use crate::scattering::Event;
 use crate::scene::Scene;
-use crate::simd::{Kernel, Lanes, Level};
+use crate::simd::{Kernel, Lanes, Level, MOST_LANES};
 use fearless_simd::prelude::*;
 
 /// The ray marcher with its fixed sample points on lights.
