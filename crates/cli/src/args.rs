@@ -201,6 +201,10 @@ pub struct BenchOptions {
     #[arg(value_enum, default_value = "all")]
     pub name: BenchName,
 
+    /// Scenes or volumes whose edits `looks` measures; without one, a generated volume
+    #[arg(value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+
     /// As JSON, all at the end
     #[arg(long)]
     pub json: bool,
@@ -221,6 +225,8 @@ pub enum BenchName {
     Core,
     /// Photon maps kept through edits, compared with the tables of the paper
     Historygrams,
+    /// How soon edits of files show, and the time of a look
+    Looks,
     /// All of them
     All,
 }

@@ -5,7 +5,6 @@ use crate::machine::{pool, vector_instructions};
 use crate::{Failure, say};
 use serde_json::json;
 use std::fmt::Write;
-use tyndall::math::Vec3;
 use tyndall::message::sentence;
 use tyndall::transfer::Preset;
 use tyndall::volume::procedural::MATERIALS;
@@ -48,7 +47,7 @@ fn to_json(volume: &Volume, source: &Source) -> serde_json::Value {
         "spacing": grid.spacing(),
         "direction": grid.direction(),
         "origin": grid.origin(),
-        "bounds": [grid.world_bounds().min.to_array(), grid.world_bounds().max.to_array()],
+        "bounds": grid.file_bounds(),
         "space": space(volume),
         "value_range": volume.value_range(),
         "robust_range": volume.robust_range(),
@@ -61,8 +60,8 @@ fn to_json(volume: &Volume, source: &Source) -> serde_json::Value {
     })
 }
 
-fn corner(p: Vec3) -> String {
-    format!("({}, {}, {})", p.x, p.y, p.z)
+fn corner([x, y, z]: [f64; 3]) -> String {
+    format!("({x}, {y}, {z})")
 }
 
 fn space(volume: &Volume) -> &'static str {
@@ -79,8 +78,8 @@ fn as_text(volume: &Volume, source: &Source) -> String {
     let [ox, oy, oz] = grid.origin();
     let [lo, hi] = volume.value_range();
     let [robust_lo, robust_hi] = volume.robust_range();
-    let bounds = grid.world_bounds();
-    let (size, corners) = (bounds.size(), [bounds.min, bounds.max]);
+    let corners = grid.file_bounds();
+    let size: [f64; 3] = std::array::from_fn(|axis| corners[1][axis] - corners[0][axis]);
     let mut text = format!(
         "voxels     {nx} x {ny} x {nz} of {}\n\
          spacing    {sx} x {sy} x {sz}\n\
@@ -93,9 +92,9 @@ fn as_text(volume: &Volume, source: &Source) -> String {
          channels   {}, time steps {}\n\
          preset     {}\n",
         volume.type_name(),
-        size.x,
-        size.y,
-        size.z,
+        size[0],
+        size[1],
+        size[2],
         corner(corners[0]),
         corner(corners[1]),
         grid.direction(),

@@ -4,10 +4,9 @@ use crate::{Failure, say, stdout_failure};
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use tyndall::film::tone::ToneCurve;
 use tyndall::film::{Film, Image};
 use tyndall_formats::image::{Display, Metadata, Picture, encode_png, write};
-use tyndall_live::document::{Background, Document, Light, Tone};
+use tyndall_live::document::{Background, Document, Light};
 
 /// The name of standard output.
 const STDOUT: &str = "-";
@@ -61,12 +60,7 @@ pub fn pictures(
         depth: Some(depth),
         transparent: document.film.background == Background::Transparent,
     };
-    let tone = match document.film.tone {
-        Tone::Agx => ToneCurve::Agx,
-        Tone::Linear => ToneCurve::Linear,
-        Tone::Reinhard => ToneCurve::Reinhard,
-        Tone::Aces => ToneCurve::Aces,
-    };
+    let tone = document.film.tone.curve();
     let display = Display { tone, exposure: document.film.exposure };
     for path in paths {
         let to_stdout = path.as_os_str() == STDOUT;

@@ -130,7 +130,7 @@ fn refine(live: &mut LiveSession, stop: &StopConditions, cancel: &Arc<AtomicBool
         // By the usual samples it is known whether the picture has an error estimate at all.
         let untold = stop.error.is_some() && error.is_none();
         let samples = if untold { stop.samples.min(stop.usual_samples) } else { stop.samples };
-        let budget = Budget { samples, deadline: Some(deadline), cancel: cancel.clone() };
+        let budget = Budget { deadline: Some(deadline), cancel: cancel.clone(), ..Budget::samples(samples) };
         live.refine(&budget);
 
         let film = live.film();

@@ -11,13 +11,15 @@ use tyndall_formats::memory::available;
 pub(crate) fn film(document: &Document, at: &str) -> Result<(), LiveError> {
     let size = document.film.size;
     // The film, the picture with its layers, and the encoder's copy of it.
-    admit(3 * Film::bytes(size), |needed, available| LiveError::Memory {
-        at: at.to_owned(),
-        key: "film.size".to_owned(),
-        what: format!("{} x {} pixels need", size[0], size[1]),
-        needed,
-        available,
-        fix: "a smaller picture",
+    admit(Film::bytes(size, document.render.samples) + 2 * Film::bytes(size, 1), |needed, available| {
+        LiveError::Memory {
+            at: at.to_owned(),
+            key: "film.size".to_owned(),
+            what: format!("{} x {} pixels need", size[0], size[1]),
+            needed,
+            available,
+            fix: "a smaller picture",
+        }
     })
 }
 

@@ -9,13 +9,13 @@ use tyndall::camera::{AutoView, Camera, FitLens, Lens, fit};
 use tyndall::light::{
     Directional, Disk, Emission, Environment, Light, LightSet, PointLight, Rect, SphereLight,
 };
-use tyndall::math::{Bounds, Frame, Rgb, Vec3, cast};
+use tyndall::math::{Bounds, DVec3, Frame, Rgb, Vec3, cast};
 use tyndall::medium::{ClipShape, Medium, MediumSettings};
 use tyndall::message::excerpt;
 use tyndall::scattering::{Abc, Brdf, HenyeyGreenstein, Phase, Schlick};
 use tyndall::scene::{Background, RenderSettings, Scene};
 use tyndall::transfer::{Optics, PRESETS, Point, Preset, TransferFunction};
-use tyndall::volume::{Space, Volume};
+use tyndall::volume::{Grid, Space, Volume};
 
 /// Why no scene can be built from a document and its assets.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -30,7 +30,7 @@ pub struct SceneError {
 /// Optical thickness of a voxel beyond which single precision can no longer distinguish the positions of collisions.
 const DENSEST: f32 = 1000.0;
 
-/// Positions farther from the origin than this leave no headroom in single precision.
+/// Positions farther from the volume's centre than this leave no headroom in single precision.
 const FARTHEST: f32 = 1e18;
 
 fn fault(path: impl Into<String>, problem: impl Display) -> SceneError {
@@ -126,7 +126,7 @@ fn medium(
         Some(before) => before.scene.medium.shared_transfer().clone(),
         None => Arc::new(threads.install(|| transfer(document, volume))?),
     };
-    let settings = medium_settings(document)?;
+    let settings = medium_settings(document, volume.grid())?;
     let old = before.map(|before| &*before.scene.medium);
     let build = || Medium::after(old, volume.clone(), transfer, &settings);
     // If the majorants are shared, handing over to other threads would take longer than the edit.
@@ -154,8 +154,8 @@ fn lights(
         (Some(before), _) => before.scene.lights.lights().to_vec(),
         (None, None) => default_lights(medium.volume().grid().space()),
         (None, Some(lights)) => {
-            let up = medium.volume().grid().space().up();
-            let read = |(i, l)| light(l, up, assets).map_err(|e| fault(format!("lights.{i}"), e));
+            let grid = medium.volume().grid();
+            let read = |(i, l)| light(l, grid, assets).map_err(|e| fault(format!("lights.{i}"), e));
             lights.iter().enumerate().map(read).collect::<Result<_, _>>()?
         }
     };
@@ -197,10 +197,10 @@ fn point(p: &document::TransferPoint) -> Point {
         roughness: p.roughness,
         ior: p.ior,
     };
-    Point { value: p.value, optics }
+    Point { value: cast::single(p.value), optics }
 }
 
-fn medium_settings(document: &Document) -> Result<MediumSettings, SceneError> {
+fn medium_settings(document: &Document, grid: &Grid) -> Result<MediumSettings, SceneError> {
     let phase = match document.medium.phase {
         document::Phase::Isotropic => Phase::Isotropic,
         document::Phase::HenyeyGreenstein { g } => {
@@ -217,9 +217,11 @@ fn medium_settings(document: &Document) -> Result<MediumSettings, SceneError> {
     };
     let clip = document.clip.iter().map(|clip| match *clip {
         document::Clip::Plane { point, normal, .. } => {
-            ClipShape::Plane { point: point.into(), normal: normal.into() }
+            ClipShape::Plane { point: grid.to_world(point), normal: normal.into() }
         }
-        document::Clip::Box { min, max, .. } => ClipShape::Box(Bounds::new(min.into(), max.into())),
+        document::Clip::Box { min, max, .. } => {
+            ClipShape::Box(Bounds::new(grid.to_world(min), grid.to_world(max)))
+        }
     });
     Ok(MediumSettings {
         density: document.medium.density,
@@ -231,26 +233,29 @@ fn medium_settings(document: &Document) -> Result<MediumSettings, SceneError> {
     })
 }
 
-fn light(light: &document::Light, world_up: Vec3, assets: &Assets) -> Result<Light, String> {
-    let vector = Vec3::from_array;
+fn light(light: &document::Light, grid: &Grid, assets: &Assets) -> Result<Light, String> {
+    let (vector, world_up) = (Vec3::from_array, grid.space().up());
+    let at = |position: &[f64; 3]| grid.to_world(*position);
+    let between =
+        |from: &[f64; 3], to: &[f64; 3]| (DVec3::from_array(*to) - DVec3::from_array(*from)).as_vec3();
     Ok(match light {
         document::Light::Directional { direction, irradiance, angle, .. } => {
             Light::Directional(Directional::new(vector(*direction), Rgb::from(*irradiance), *angle))
         }
         document::Light::Point { position, intensity, .. } => {
-            Light::Point(PointLight { position: vector(*position), intensity: Rgb::from(*intensity) })
+            Light::Point(PointLight { position: at(position), intensity: Rgb::from(*intensity) })
         }
         document::Light::Rect { position, target, up, size, radiance, .. } => {
-            let facing = vector(*target) - vector(*position);
+            let facing = between(position, target);
             let up = up.map_or(world_up, vector);
-            Light::Rect(Rect::new(vector(*position), facing, up, *size, Rgb::from(*radiance)))
+            Light::Rect(Rect::new(at(position), facing, up, *size, Rgb::from(*radiance)))
         }
         document::Light::Disk { position, target, radius, radiance, .. } => {
-            let facing = vector(*target) - vector(*position);
-            Light::Disk(Disk::new(vector(*position), facing, *radius, Rgb::from(*radiance)))
+            let facing = between(position, target);
+            Light::Disk(Disk::new(at(position), facing, *radius, Rgb::from(*radiance)))
         }
         document::Light::Sphere { position, radius, radiance, .. } => Light::Sphere(SphereLight {
-            middle: vector(*position),
+            middle: at(position),
             radius: *radius,
             radiance: Rgb::from(*radiance),
         }),
@@ -286,7 +291,7 @@ fn camera(document: &Document, volume: &Volume) -> Result<Camera, SceneError> {
     let grid = volume.grid();
     let given = document.camera.clone().unwrap_or_default();
     let up = given.up().map(Vec3::from_array);
-    let Some(position) = given.position().map(Vec3::from_array) else {
+    let Some(given_position) = given.position() else {
         let auto = given.auto();
         let usual = AutoView::default_for(grid.space());
         let view = AutoView {
@@ -301,17 +306,21 @@ fn camera(document: &Document, volume: &Volume) -> Result<Camera, SceneError> {
             document::Camera::Orthographic { height, .. } => FitLens::Orthographic { height },
         };
         let camera = fit(grid, view, up, lens, document.film.size);
-        let place = camera.position();
-        if !place.is_finite() || place.length() > FARTHEST {
-            let problem = format!("the volume fits only from {place}; expected a wider field of view");
+        let position = camera.position();
+        if !position.is_finite() || position.length() > FARTHEST {
+            let distance = position.length();
+            let problem =
+                format!("the volume fits only from {distance:e} away; expected a wider field of view");
             return Err(fault("camera.fov", problem));
         }
         return Ok(camera);
     };
-    let target = given.target().map_or_else(|| grid.world_bounds().center(), Vec3::from_array);
+    let (position, given_target) = (grid.to_world(given_position), given.target().unwrap_or(grid.center()));
+    let target = grid.to_world(given_target);
     let view = target - position;
-    if view.length() <= 1e-6 * (1.0 + position.length()) {
-        let problem = format!("{position} is also the target; expected two positions: move one of them");
+    if view.length() <= 1e-6 * position.length() || view.length() == 0.0 {
+        let problem =
+            format!("{given_position:?} is also the target; expected two positions: move one of them");
         return Err(fault("camera.position", problem));
     }
     let up = up.unwrap_or_else(|| {

@@ -12,7 +12,7 @@ use serde_json::Value;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use tyndall::film::{Film, Image};
+use tyndall::film::{Film, Image, Tone, Viewer};
 use tyndall::integrator::{MethodReport, Resources, method_of};
 use tyndall::scene::{Difference, Scene};
 use tyndall::session::{Budget, Progress, Session};
@@ -184,7 +184,7 @@ impl LiveSession {
         let begun = Instant::now();
         let (document, assets) = self.parse(value.clone(), at)?;
         let before = &self.built.document;
-        if document.film.size != before.film.size {
+        if document.film.size != before.film.size || document.render.samples != before.render.samples {
             admission::film(&document, at)?;
         }
         let more_memory = document.film.size != before.film.size || document.render != before.render;
@@ -222,6 +222,12 @@ impl LiveSession {
     #[must_use]
     pub fn image(&self) -> Image {
         self.session.image()
+    }
+
+    /// Brings a viewer's picture up to date, toned as the document says.
+    pub fn look(&self, viewer: &mut Viewer) {
+        let film = &self.document().film;
+        self.session.look(viewer, Tone { curve: film.tone.curve(), stops: film.exposure });
     }
 
     /// The film so far.

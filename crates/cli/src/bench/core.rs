@@ -2,17 +2,18 @@
 
 use super::Row;
 use super::scenes::{Bench, cloud, ct};
-use super::timing::Effort;
+use super::timing::{Effort, median};
 use crate::Failure;
 use serde_json::json;
 use std::time::{Duration, Instant};
-use tyndall::integrator::METHODS;
+use tyndall::integrator::{METHODS, Resources};
 use tyndall::math::{Ray, Vec3};
 use tyndall::medium::{MajorantGrid, Medium};
 use tyndall::sampling::Stream;
 use tyndall::scene::Scene;
 use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
+use tyndall_live::document;
 
 /// The number of march steps of all primary rays of a picture.
 fn steps(scene: &Scene, step: f32) -> f64 {
@@ -154,25 +155,71 @@ pub fn threads(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     Ok(rows)
 }
 
-/// How long after its deadline each method stops, and how long majorants take after an edit of the transfer function.
+/// How late a session reacts, in milliseconds.
+#[derive(Default)]
+struct Lateness {
+    /// By how much each slice of work overran its deadline.
+    stops: Vec<f64>,
+    /// Time to accept each edited scene.
+    edits: Vec<f64>,
+}
+
+impl Lateness {
+    /// Refines in slices of 3 to 20 ms, so that deadlines fall in all stages of the work.
+    fn refine(&mut self, session: &mut Session, samples: u32, slices: u64) {
+        for slice in 0..slices {
+            if session.film().samples() >= samples {
+                return;
+            }
+            let deadline = Instant::now() + Duration::from_millis(3 + slice * 7 % 18);
+            session.refine(&Budget { deadline: Some(deadline), ..Budget::samples(samples) });
+            if session.film().samples() < samples {
+                self.stops.push(deadline.elapsed().as_secs_f64() * 1e3);
+            }
+        }
+    }
+
+    fn edit(&mut self, session: &mut Session, scene: Scene) {
+        let begun = Instant::now();
+        session.set_scene(scene);
+        self.edits.push(begun.elapsed().as_secs_f64() * 1e3);
+    }
+}
+
+/// How late each method stops, through all stages of its work, and how long it takes to accept an edit; and how long majorants
+/// take after an edit of the transfer function.
 pub fn latency(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
-    const TABLE: &str = "latency, two threads";
-    let bench = Bench::new(ct(effort.pick(256, 64)), 2)?;
+    const TABLE: &str = "latency, 256^3 voxels, 512 x 512 pixels, 8 scatterings, two threads";
+    const MOST_MS: f64 = 5.0;
+    let voxels = effort.pick(256, 64);
+    let bench = Bench::new(ct(voxels), 2)?;
+    let mut points = ct(voxels)["transfer_function"]["points"].clone();
+    points[1]["opacity"] = 0.8.into();
+    let edits = [
+        json!({ "transfer_function": { "points": points } }),
+        json!({ "medium": { "density": 0.2 } }),
+        json!({ "lights": [{ "type": "directional", "direction": [1, -1, 0], "irradiance": [3, 3, 3] }] }),
+        json!({ "camera": { "auto": { "azimuth": 70 } } }),
+    ];
+    let (samples, slices) = effort.pick((3, 200), (100_000, 2));
     let mut rows = Vec::new();
     for integrator in METHODS.iter().map(|method| method.name) {
-        let patch = json!({ "render": { "integrator": integrator, "max_scatter": 1000 } });
-        let mut session = Session::with_level(bench.scene(&patch)?, bench.threads().clone(), level);
-        let mut late: Vec<f64> = (0..effort.pick(40, 4))
-            .map(|_| {
-                let deadline = Instant::now() + Duration::from_millis(25);
-                session.refine(&Budget { deadline: Some(deadline), ..Budget::samples(u32::MAX) });
-                deadline.elapsed().as_secs_f64() * 1e3
-            })
-            .collect();
-        late.sort_by(f64::total_cmp);
-        let name = format!("{integrator}: past the deadline");
-        rows.push(Row::new(TABLE, name.clone(), "median", "ms", late[late.len() / 2]).at_most(5.0));
-        rows.push(Row::new(TABLE, name, "worst", "ms", late[late.len() - 1]).at_most(5.0));
+        let side = effort.pick(512, 32);
+        let base = json!({ "film": { "size": [side, side] }, "render": { "integrator": integrator, "max_scatter": 8 } });
+        let resources = Resources { level, edit_memory: 1 << 29 };
+        let mut session = Session::with_resources(bench.scene(&base)?, bench.threads().clone(), resources);
+        let mut late = Lateness::default();
+        late.refine(&mut session, samples, slices);
+        for edit in &edits {
+            late.edit(&mut session, bench.scene(&document::apply(&base, edit))?);
+            late.refine(&mut session, samples, slices);
+        }
+        for (what, times) in [("past the deadline", late.stops), ("to accept an edit", late.edits)] {
+            let name = format!("{integrator}: {what}");
+            let worst = times.iter().copied().fold(0.0, f64::max);
+            rows.push(Row::new(TABLE, name.clone(), "median", "ms", median(times)).at_most(MOST_MS));
+            rows.push(Row::new(TABLE, name, "worst", "ms", worst).at_most(MOST_MS));
+        }
     }
     let scene = bench.scene(&json!({}))?;
     let (volume, transfer) = (scene.medium.volume(), scene.medium.transfer());

@@ -6,6 +6,7 @@ mod gathering;
 mod growth;
 mod historygram_figures;
 mod historygrams;
+mod looks;
 mod photon_scenes;
 mod samples;
 mod scene_edits;
@@ -15,6 +16,7 @@ mod timing;
 use crate::args::{BenchName, BenchOptions};
 use crate::{Failure, say};
 use serde_json::{Value, json};
+use tyndall::simd::Level;
 
 /// One figure.
 pub struct Row {
@@ -160,7 +162,7 @@ fn markdown(title: &str, rows: &[Row]) -> String {
 }
 
 /// Measures the rows of one table with the given vector instructions.
-type Table = fn(&timing::Effort, tyndall::simd::Level) -> Result<Vec<Row>, Failure>;
+type Table = fn(&timing::Effort, Level) -> Result<Vec<Row>, Failure>;
 
 const CORE: &[Table] = &[
     core::sampling,
@@ -189,10 +191,14 @@ pub fn run(options: &BenchOptions) -> Result<(), Failure> {
     let level = crate::machine::vector_instructions()?;
     let effort = timing::Effort::new(options.quick);
     let mut all = Vec::new();
-    let tables = match options.name {
-        BenchName::Core => CORE.to_vec(),
-        BenchName::Historygrams => HISTORYGRAMS.to_vec(),
-        BenchName::All => [CORE, HISTORYGRAMS].concat(),
+    let edits = |effort: &timing::Effort, level| looks::edits(effort, level, &options.files);
+    let looks: [&dyn Fn(&timing::Effort, Level) -> Result<Vec<Row>, Failure>; 2] = [&edits, &looks::look];
+    let fixed = |tables: &'static [Table]| tables.iter().map(|table| table as _);
+    let tables: Vec<_> = match options.name {
+        BenchName::Core => fixed(CORE).collect(),
+        BenchName::Historygrams => fixed(HISTORYGRAMS).collect(),
+        BenchName::Looks => looks.to_vec(),
+        BenchName::All => fixed(CORE).chain(looks).chain(fixed(HISTORYGRAMS)).collect(),
     };
     for table in tables {
         let rows = table(&effort, level)?;

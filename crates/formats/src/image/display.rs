@@ -1,32 +1,32 @@
 //! The picture as 8-bit code values.
 
 use tyndall::film::tone::quantize;
-use tyndall::math::Rgb;
+use tyndall::simd::Level;
 
 use super::{Display, Picture};
 
 /// Opaque RGB, three bytes a pixel; premultiplied colours of a transparent picture already are the picture over black.
 pub(super) fn rgb8(picture: &Picture, display: &Display) -> Vec<u8> {
-    picture.rgba.iter().flat_map(|&[r, g, b, _]| shown(Rgb::new(r, g, b), display)).collect()
+    encoded(picture.rgba.iter().map(|&[r, g, b, _]| [r, g, b]), display).into_flattened()
 }
 
 /// Straight RGBA, four bytes a pixel: colours are divided by opacity before the tone curve; opacity stays linear.
 ///
 /// Where the opacity is 0 the pixel is transparent black: straight alpha cannot represent light at zero opacity.
 pub(super) fn straight_rgba8(picture: &Picture, display: &Display) -> Vec<u8> {
-    let pixel = |&[r, g, b, alpha]: &[f32; 4]| {
-        let opacity = quantize(alpha);
-        if opacity == 0 {
-            return [0; 4];
-        }
-        let [r, g, b] = shown(Rgb::new(r, g, b) / alpha, display);
-        [r, g, b, opacity]
+    let codes = encoded(picture.rgba.iter().map(|&[r, g, b, alpha]| [r, g, b].map(|x| x / alpha)), display);
+    let pixel = |(&[_, _, _, alpha], [r, g, b]): (&[f32; 4], [u8; 3])| match quantize(alpha) {
+        0 => [0; 4],
+        opacity => [r, g, b, opacity],
     };
-    picture.rgba.iter().flat_map(pixel).collect()
+    picture.rgba.iter().zip(codes).flat_map(pixel).collect()
 }
 
-fn shown(linear: Rgb, display: &Display) -> [u8; 3] {
-    display.tone.map(linear, display.exposure).to_array().map(quantize)
+fn encoded(pixels: impl Iterator<Item = [f32; 3]>, display: &Display) -> Vec<[u8; 3]> {
+    let pixels: Vec<[f32; 3]> = pixels.collect();
+    let mut codes = vec![[0; 3]; pixels.len()];
+    display.tone.encode(Level::best(), display.exposure, &pixels, &mut codes);
+    codes
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::shape::{Elevation, FieldOfView, NonNegative, Positive, Vector};
+use super::shape::{Elevation, FieldOfView, NonNegative, Position, Positive, Vector};
 
 /// The viewpoint of the picture. Give a `position`, or `auto`, or neither for an automatic view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -18,12 +18,12 @@ pub enum Camera {
     Perspective {
         /// Position of the eye, in world units.
         #[serde(skip_serializing_if = "Option::is_none")]
-        #[schemars(with = "Option<Vector>")]
-        position: Option<[f32; 3]>,
+        #[schemars(with = "Option<Position>")]
+        position: Option<[f64; 3]>,
         /// Point to look at; when omitted, the centre of the volume. Only with `position`.
         #[serde(skip_serializing_if = "Option::is_none")]
-        #[schemars(with = "Option<Vector>")]
-        target: Option<[f32; 3]>,
+        #[schemars(with = "Option<Position>")]
+        target: Option<[f64; 3]>,
         /// Direction that is up in the picture; when omitted, [0, 0, 1] for an anatomical volume, otherwise [0, 1, 0].
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Vector>")]
@@ -52,12 +52,12 @@ pub enum Camera {
     Orthographic {
         /// A point on the plane from which the rays start, in world units: the centre of the picture.
         #[serde(skip_serializing_if = "Option::is_none")]
-        #[schemars(with = "Option<Vector>")]
-        position: Option<[f32; 3]>,
+        #[schemars(with = "Option<Position>")]
+        position: Option<[f64; 3]>,
         /// Point to look at; when omitted, the centre of the volume. Only with `position`.
         #[serde(skip_serializing_if = "Option::is_none")]
-        #[schemars(with = "Option<Vector>")]
-        target: Option<[f32; 3]>,
+        #[schemars(with = "Option<Position>")]
+        target: Option<[f64; 3]>,
         /// Direction that is up in the picture; when omitted, [0, 0, 1] for an anatomical volume, otherwise [0, 1, 0].
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Vector>")]
@@ -75,14 +75,14 @@ pub enum Camera {
 impl Camera {
     /// Position of the eye; `None` means an automatic view.
     #[must_use]
-    pub fn position(&self) -> Option<[f32; 3]> {
+    pub fn position(&self) -> Option<[f64; 3]> {
         let (Self::Perspective { position, .. } | Self::Orthographic { position, .. }) = self;
         *position
     }
 
     /// Point to look at; `None` means the centre of the volume.
     #[must_use]
-    pub fn target(&self) -> Option<[f32; 3]> {
+    pub fn target(&self) -> Option<[f64; 3]> {
         let (Self::Perspective { target, .. } | Self::Orthographic { target, .. }) = self;
         *target
     }

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::shape::Vector;
+use super::shape::{Position, Vector};
 
 /// A cut through the volume; what is cut away is vacuum. If there are several clips, all apply.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -15,8 +15,8 @@ pub enum Clip {
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
         /// A point on the plane, in world units.
-        #[schemars(with = "Vector")]
-        point: [f32; 3],
+        #[schemars(with = "Position")]
+        point: [f64; 3],
         /// Direction to the side that is cut away; any length but 0.
         #[schemars(with = "Vector")]
         normal: [f32; 3],
@@ -27,11 +27,11 @@ pub enum Clip {
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
         /// Lowest corner, in world units.
-        #[schemars(with = "Vector")]
-        min: [f32; 3],
+        #[schemars(with = "Position")]
+        min: [f64; 3],
         /// Highest corner, in world units.
-        #[schemars(with = "Vector")]
-        max: [f32; 3],
+        #[schemars(with = "Position")]
+        max: [f64; 3],
     },
 }
 

@@ -105,7 +105,8 @@ mod tests {
             ("medium.density", "a number of at least 0"),
             ("medium.phase", "a table with a `type`"),
             ("lights", "a list of tables"),
-            ("camera.position", "a list of 3 numbers"),
+            ("camera.position", "a list of 3 numbers from -1e+38 to 1e+38"),
+            ("camera.up", "a list of 3 numbers"),
             ("camera.fov", "a number between 0 and 180, ends excluded"),
             (
                 "film.background",

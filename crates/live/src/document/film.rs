@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tyndall::film::tone::ToneCurve;
 
 use super::shape::{Color, Exposure, Size};
 
@@ -43,6 +44,19 @@ pub enum Tone {
     Reinhard,
     /// A fit of the ACES film curve.
     Aces,
+}
+
+impl Tone {
+    /// The curve that it names.
+    #[must_use]
+    pub fn curve(self) -> ToneCurve {
+        match self {
+            Self::Agx => ToneCurve::Agx,
+            Self::Linear => ToneCurve::Linear,
+            Self::Reinhard => ToneCurve::Reinhard,
+            Self::Aces => ToneCurve::Aces,
+        }
+    }
 }
 
 /// What is seen behind the volume: the environment, nothing, or a colour that lights nothing.

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::shape::{Color, ConeAngle, Positive, Vector};
+use super::shape::{Color, ConeAngle, Position, Positive, Vector};
 
 /// A light. It blocks no light, casts no shadow, and may be inside the volume.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -31,8 +31,8 @@ pub enum Light {
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
         /// Position of the light, in world units.
-        #[schemars(with = "Vector")]
-        position: [f32; 3],
+        #[schemars(with = "Position")]
+        position: [f64; 3],
         /// Radiant intensity, in W sr^-1.
         #[schemars(with = "Color")]
         intensity: [f32; 3],
@@ -43,11 +43,11 @@ pub enum Light {
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
         /// Centre, in world units.
-        #[schemars(with = "Vector")]
-        position: [f32; 3],
+        #[schemars(with = "Position")]
+        position: [f64; 3],
         /// Point that the light faces.
-        #[schemars(with = "Vector")]
-        target: [f32; 3],
+        #[schemars(with = "Position")]
+        target: [f64; 3],
         /// Up direction of the rectangle, along which its height is measured; when omitted, the world's up.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Vector>")]
@@ -65,11 +65,11 @@ pub enum Light {
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
         /// Centre, in world units.
-        #[schemars(with = "Vector")]
-        position: [f32; 3],
+        #[schemars(with = "Position")]
+        position: [f64; 3],
         /// Point that the light faces.
-        #[schemars(with = "Vector")]
-        target: [f32; 3],
+        #[schemars(with = "Position")]
+        target: [f64; 3],
         /// Radius, in world units.
         #[schemars(with = "Positive")]
         radius: f32,
@@ -83,8 +83,8 @@ pub enum Light {
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
         /// Centre, in world units.
-        #[schemars(with = "Vector")]
-        position: [f32; 3],
+        #[schemars(with = "Position")]
+        position: [f64; 3],
         /// Radius, in world units.
         #[schemars(with = "Positive")]
         radius: f32,

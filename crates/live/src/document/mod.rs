@@ -156,16 +156,7 @@ impl Document {
     /// Never: a document always serializes to a JSON value.
     #[must_use]
     pub fn to_value(&self) -> Value {
-        let mut value = serde_json::to_value(self).expect("tables of plain keys");
-        number::shorten(&mut value);
-        if let (Some(raw), Some(written)) = (&self.volume.raw, value.pointer_mut("/volume/raw")) {
-            // These two are in double precision, where a shortened decimal could be a different number.
-            written["spacing"] = raw.spacing.to_vec().into();
-            if let Some(origin) = raw.origin {
-                written["origin"] = origin.to_vec().into();
-            }
-        }
-        value
+        number::to_value(self).expect("tables of plain keys")
     }
 }
 

@@ -1,11 +1,42 @@
 //! Decimal notation of single-precision numbers inside JSON values, which hold double precision.
 
+use serde::Serialize;
 use serde_json::{Number, Value};
 
 use tyndall::math::cast;
 
-/// Replaces each number that single precision holds exactly by the shortest decimal that parses to the same number:
-/// 0.04 instead of 0.03999999910593033.
+/// The value that `document` serializes to, with its single-precision numbers as the shortest decimals that read back as the
+/// same: 0.04 instead of 0.03999999910593033. Numbers in double precision stay what they are, to the last bit.
+///
+/// # Errors
+/// Those of the type's own serialization.
+pub(super) fn to_value(document: &impl Serialize) -> Result<Value, serde_json::Error> {
+    let mut value = serde_json::to_value(document)?;
+    // As text, a number of either precision is its shortest decimal.
+    let text = serde_json::to_string(document)?;
+    shorten_as(&mut value, &serde_json::from_str(&text)?);
+    Ok(value)
+}
+
+/// Replaces single-precision numbers by their shortest decimals, which `short` has at the same places.
+fn shorten_as(value: &mut Value, short: &Value) {
+    match (value, short) {
+        (Value::Number(number), Value::Number(decimal)) if number != decimal => {
+            if let Some(short) = number.as_f64().and_then(shortest) {
+                *number = short;
+            }
+        }
+        (Value::Array(items), Value::Array(short)) => {
+            items.iter_mut().zip(short).for_each(|(item, short)| shorten_as(item, short));
+        }
+        (Value::Object(table), Value::Object(short)) => {
+            table.values_mut().zip(short.values()).for_each(|(item, short)| shorten_as(item, short));
+        }
+        _ => {}
+    }
+}
+
+/// The same for a value that has only single-precision numbers.
 pub(super) fn shorten(value: &mut Value) {
     match value {
         Value::Number(number) => {
@@ -52,8 +83,16 @@ mod tests {
 
     #[test]
     fn double_precision_numbers_stay() {
-        for x in [0.1, 1.0 / 3.0, 1e300] {
-            assert_eq!(shortened(x).to_bits(), x.to_bits());
+        #[derive(Serialize)]
+        struct Both {
+            double: f64,
+            single: f32,
+        }
+        // The last is also a single-precision number, whose decimal is 0.04.
+        for double in [0.1, 1.0 / 3.0, 1e300, f64::from(0.04_f32)] {
+            let value = to_value(&Both { double, single: 0.04 }).unwrap();
+            assert_eq!(value["double"].as_f64().unwrap().to_bits(), double.to_bits());
+            assert_eq!(value["single"].to_string(), "0.04");
         }
     }
 

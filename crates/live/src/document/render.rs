@@ -8,6 +8,7 @@ use serde_json::{Map, Value};
 use tyndall::integrator::{DEFAULT_METHOD, METHODS, MethodEntry, method_named};
 use tyndall::scene::MethodChoice;
 
+use super::number;
 use super::shape::{Samples, ScatteringOrder};
 
 /// How the picture is computed: the method, its effort, and the settings of every method.
@@ -88,7 +89,11 @@ impl From<Render> for Map<String, Value> {
             other => unreachable!("plain keys are a table, not {other:?}"),
         };
         for (entry, settings) in render.tables() {
-            table.extend(entry.write(settings).map(|settings| (entry.table(), settings)));
+            let written = entry.write(settings).map(|mut settings| {
+                number::shorten(&mut settings);
+                (entry.table(), settings)
+            });
+            table.extend(written);
         }
         table
     }

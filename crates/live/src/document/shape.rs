@@ -54,7 +54,16 @@ shapes! {
     Samples = { "type": "integer", "format": "uint32", "minimum": 1, "maximum": 2_147_483_648_u32 };
     /// An edge in voxels, or 0.
     MajorantCell = { "type": "integer", "format": "uint32", "minimum": 0, "maximum": 4096 };
-    /// A position or a direction in world space.
+    /// A position in world space; the ends keep distances within single precision.
+    Position = {
+        "type": "array",
+        "items": { "type": "number", "format": "double", "minimum": -1e38, "maximum": 1e38 },
+        "minItems": 3,
+        "maxItems": 3
+    };
+    /// A data value; the ends are those of single precision.
+    DataValue = { "type": "number", "format": "double", "minimum": -3.402_823_466e38, "maximum": 3.402_823_466e38 };
+    /// A direction in world space.
     Vector = {
         "type": "array",
         "items": { "type": "number", "format": "float" },

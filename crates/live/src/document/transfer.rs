@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::shape::{Color, Fraction, FractionColor, Positive};
+use super::shape::{Color, DataValue, Fraction, FractionColor, Positive};
 
 /// How each data value looks: a named `preset`, or `points`; with neither, a preset that suits the kind of volume.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -27,7 +27,8 @@ pub struct TransferFunction {
 #[serde(deny_unknown_fields)]
 pub struct TransferPoint {
     /// Data value, in the file's units (for CT, Hounsfield units).
-    pub value: f32,
+    #[schemars(with = "DataValue")]
+    pub value: f64,
 
     /// Extinction at this value as a fraction of `medium.density`, from 0 to 1; not alpha per step.
     #[schemars(with = "Fraction")]
@@ -67,7 +68,7 @@ pub struct TransferPoint {
 impl TransferPoint {
     /// A point whose other quantities have their defaults.
     #[must_use]
-    pub fn new(value: f32, opacity: f32) -> Self {
+    pub fn new(value: f64, opacity: f32) -> Self {
         Self {
             value,
             opacity,

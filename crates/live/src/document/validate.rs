@@ -2,7 +2,7 @@
 
 use super::error::{DocumentError, Problem, Problems, join};
 use super::{Camera, Clip, Document, Film, Light, TransferPoint};
-use tyndall::math::DVec3;
+use tyndall::math::{DVec3, cast};
 
 /// Most pixels of a film; whether they fit in memory is checked later.
 const MOST_PIXELS: u64 = 1 << 28;
@@ -35,7 +35,7 @@ pub(super) fn validate(document: &Document) -> Result<(), DocumentError> {
 fn validate_points(points: &[TransferPoint], problems: &mut Problems) {
     let path = |i: usize| format!("transfer_function.points.{i}.value");
     for (i, pair) in points.windows(2).enumerate() {
-        let [before, here] = [pair[0].value, pair[1].value];
+        let [before, here] = [&pair[0], &pair[1]].map(|point| point.value);
         if here < before {
             let problem = Problem::new(path(i + 1), format!("{here} after {before}"), "ascending values");
             problems.push(problem.with_fix("order the points by value"));
@@ -43,7 +43,8 @@ fn validate_points(points: &[TransferPoint], problems: &mut Problems) {
     }
     for (i, triple) in points.windows(3).enumerate() {
         let here = triple[2].value;
-        if triple.iter().all(|point| point.value == here) {
+        // As the renderer holds values: in single precision.
+        if triple.iter().all(|point| cast::single(point.value) == cast::single(here)) {
             let found = format!("a third point at {here}");
             let problem = Problem::new(path(i + 2), found, "at most two points at one value (a jump)");
             problems.push(problem.with_fix("keep only the first and the last point at that value"));
@@ -96,8 +97,8 @@ fn validate_clip(clip: &Clip, path: &str, problems: &mut Problems) {
 
 /// Requires something at `position` to look at a different point, with an `up` that is not along the view.
 fn require_view(
-    position: [f32; 3],
-    target: [f32; 3],
+    position: [f64; 3],
+    target: [f64; 3],
     up: Option<[f32; 3]>,
     path: &str,
     problems: &mut Problems,
@@ -105,7 +106,7 @@ fn require_view(
     /// Sine of the smallest angle between up and view at which single precision can still distinguish left from right.
     const SMALLEST_SINE: f64 = 1e-4;
 
-    let view = vector(target) - vector(position);
+    let view = DVec3::from_array(target) - DVec3::from_array(position);
     if !LENGTHS.contains(&view.length()) {
         let found = format!("a distance of {:e} from `position`", view.length());
         let problem =

@@ -48,7 +48,7 @@ pub enum FitLens {
 /// Share of the picture left free around the volume.
 const MARGIN: f32 = 0.04;
 
-/// Looks at the middle of a volume from where all its corners just fit on a film of the given shape.
+/// Looks at the middle of a volume, the world's origin, from where all its corners just fit on a film of the given shape.
 ///
 /// The front is -y for anatomical volumes (LPS: the patient's face) and +z for others.
 #[must_use]
@@ -67,10 +67,9 @@ pub fn fit(grid: &Grid, view: AutoView, up: Option<Vec3>, lens: FitLens, size: [
     let up = if cos_e.abs() < 1e-3 { -(front * cos_a + right * sin_a) * sin_e.signum() } else { up };
     let up = chosen_up.filter(|up| up.cross(outwards).length() > 1e-3 * up.length()).unwrap_or(up);
 
-    let middle = grid.world_bounds().center();
-    // Computed from directions alone: far from the origin or the volume, differences of positions lose precision.
+    // Computed from directions alone: far from the volume, differences of positions lose precision.
     let frame = upright(-outwards, up);
-    let corners = grid.world_corners().map(|corner| frame.to_local(corner - middle));
+    let corners = grid.world_corners().map(|corner| frame.to_local(corner));
     let aspect = size[0] as f32 / size[1] as f32;
     // Half the picture height that a corner needs at its distance.
     let needed = |corner: &Vec3| (corner.x.abs() / aspect).max(corner.y.abs()) / (1.0 - MARGIN);
@@ -89,7 +88,7 @@ pub fn fit(grid: &Grid, view: AutoView, up: Option<Vec3>, lens: FitLens, size: [
             (2.0 * most(&|corner| corner.length()), Lens::Orthographic { height })
         }
     };
-    Camera { position: middle + outwards * distance, frame, lens }
+    Camera { position: outwards * distance, frame, lens }
 }
 
 #[cfg(test)]

@@ -3,10 +3,18 @@
 //! The film is divided into tiles, each processed by one thread at a time, so that neighbouring pixels never share a
 //! cache line across threads and a tile may be a sample ahead of another.
 
+mod estimate;
+mod look;
+mod tile;
 pub mod tone;
+
+pub use look::{Tone, Viewer};
+pub use tile::{Goal, Stride, TILE, Tile};
 
 use crate::math::{Rgb, cast};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use tile::{Order, PixelEstimate, bytes_of_pixel};
 
 /// The result of one sample of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,116 +27,15 @@ pub struct PixelSample {
     pub depth: f32,
 }
 
-/// Edge of a tile in pixels.
-pub const TILE: u32 = 16;
-
-/// Mean and sum of squared deviations of the samples of one pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Pixel {
-    mean: [f32; 3],
-    /// Sum of squared deviations from the mean.
-    scatter: [f32; 3],
-    /// The same for the luminance; it cannot be derived from those of the channels.
-    luminance_scatter: f32,
-    alpha: f32,
-    depth: f32,
-}
-
-impl Pixel {
-    /// Welford's update with the `n`-th sample, in double precision.
-    fn add(&mut self, sample: &PixelSample, n: f64) {
-        let radiance = sample.radiance.to_array();
-        let luminance = f64::from(sample.radiance.luminance());
-        let before = luminance - luminance_of(self.mean.map(f64::from));
-        for (x, (mean, scatter)) in radiance.into_iter().zip(self.mean.iter_mut().zip(&mut self.scatter)) {
-            let x = f64::from(x);
-            let (old, sum) = (f64::from(*mean), f64::from(*scatter));
-            let moved = old + (x - old) / n;
-            *mean = cast::single(moved);
-            *scatter = cast::single(sum + (x - old) * (x - moved));
-        }
-        let after = luminance - luminance_of(self.mean.map(f64::from));
-        self.luminance_scatter = cast::single(f64::from(self.luminance_scatter) + before * after);
-        let blend = |old: f32, new: f32| cast::single(f64::from(old) + (f64::from(new) - f64::from(old)) / n);
-        self.alpha = blend(self.alpha, sample.alpha);
-        self.depth = blend(self.depth, sample.depth);
-    }
-}
-
 fn luminance_of([r, g, b]: [f64; 3]) -> f64 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
-/// A square of pixels that take their samples in turn.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tile {
-    origin: [u32; 2],
-    /// Position of each pixel in the tile, in blocks of 4 x 4, so that consecutive pixels are close together.
-    order: Arc<[[u32; 2]]>,
-    samples: u32,
-    /// Number of pixels that have one sample more.
-    ahead: usize,
-    pixels: Vec<Pixel>,
-}
-
-/// Edge of the blocks in which a tile's pixels are ordered.
-const BLOCK: u32 = 4;
-
-impl Tile {
-    /// Number of samples that every pixel of the tile has.
-    #[must_use]
-    pub fn samples(&self) -> u32 {
-        self.samples
-    }
-
-    /// Number of pixels.
-    #[must_use]
-    pub fn pixel_count(&self) -> usize {
-        self.pixels.len()
-    }
-
-    /// Number of samples that its pixels have taken in total.
-    #[must_use]
-    pub fn taken(&self) -> usize {
-        self.samples as usize * self.pixels.len() + self.ahead
-    }
-
-    /// At most `most` pixels that are next to take a sample, and the sample number, which is the same for all of them.
-    pub fn next(&self, most: usize) -> (impl ExactSizeIterator<Item = [u32; 2]>, u32) {
-        let last = self.order.len().min(self.ahead + most);
-        let [x, y] = self.origin;
-        (
-            self.order[self.ahead..last].iter().map(move |position| [x + position[0], y + position[1]]),
-            self.samples,
-        )
-    }
-
-    /// Adds a sample to the next pixel in turn.
-    pub fn add(&mut self, sample: &PixelSample) {
-        self.pixels[self.ahead].add(sample, f64::from(self.samples) + 1.0);
-        self.ahead += 1;
-        if self.ahead == self.pixels.len() {
-            self.samples += 1;
-            self.ahead = 0;
-        }
-    }
-
-    /// Number of samples of the `i`-th pixel.
-    fn samples_of(&self, i: usize) -> f64 {
-        f64::from(self.samples) + f64::from(i < self.ahead)
-    }
-}
-
-/// The order of a tile's pixels.
-fn order([width, height]: [u32; 2]) -> Arc<[[u32; 2]]> {
-    let mut positions: Vec<_> = (0..width * height).map(|i| [i % width, i / width]).collect();
-    positions.sort_by_key(|&[x, y]| (y / BLOCK, x / BLOCK, y, x));
-    positions.into()
-}
-
 /// A picture being rendered.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Film {
+    /// Tells it from every other film of this process, so that a viewer notices a new one.
+    generation: u64,
     size: [u32; 2],
     tiles: Vec<Tile>,
 }
@@ -151,15 +58,16 @@ impl Film {
     #[must_use]
     pub fn new(size: [u32; 2]) -> Self {
         let [columns, rows] = size.map(|n| n.div_ceil(TILE));
-        let whole = order([TILE; 2]);
+        let whole = Arc::new(Order::new([TILE; 2]));
         let tile = |i: u32| {
             let origin = [i % columns * TILE, i / columns * TILE];
             let size = [0, 1].map(|a| TILE.min(size[a] - origin[a]));
-            let order = if size == [TILE; 2] { whole.clone() } else { order(size) };
-            let pixels = vec![Pixel::default(); order.len()];
-            Tile { origin, order, samples: 0, ahead: 0, pixels }
+            let order = if size == [TILE; 2] { whole.clone() } else { Arc::new(Order::new(size)) };
+            Tile::new(origin, order)
         };
-        Self { size, tiles: (0..columns * rows).map(tile).collect() }
+        static FILMS: AtomicU64 = AtomicU64::new(1);
+        let generation = FILMS.fetch_add(1, Ordering::Relaxed);
+        Self { generation, size, tiles: (0..columns * rows).map(tile).collect() }
     }
 
     /// Number of tiles of a film of this size.
@@ -168,10 +76,10 @@ impl Film {
         size.map(|n| n.div_ceil(TILE) as usize).iter().product()
     }
 
-    /// Bytes that a film of this size occupies.
+    /// Bytes that a film of this size occupies once every pixel has this many samples.
     #[must_use]
-    pub fn bytes(size: [u32; 2]) -> u64 {
-        u64::from(size[0]) * u64::from(size[1]) * size_of::<Pixel>() as u64
+    pub fn bytes(size: [u32; 2], samples: u32) -> u64 {
+        u64::from(size[0]) * u64::from(size[1]) * bytes_of_pixel(samples) as u64
     }
 
     /// Width and height.
@@ -188,7 +96,26 @@ impl Film {
     /// Minimum number of samples per pixel.
     #[must_use]
     pub fn samples(&self) -> u32 {
-        self.tiles.iter().map(|t| t.samples).min().unwrap_or(0)
+        self.tiles.iter().map(Tile::samples).min().unwrap_or(0)
+    }
+
+    /// Whether every tile has come as far as a goal.
+    #[must_use]
+    pub fn has_reached(&self, goal: Goal) -> bool {
+        self.tiles.iter().all(|tile| tile.has_reached(goal))
+    }
+
+    /// The coarsest stride whose pixels do not all have a sample yet; `None` if even the finest do.
+    pub(crate) fn coarse_goal(&self) -> Option<Goal> {
+        let goals = Stride::ALL.map(|stride| Goal { samples: 0, more: Some(stride) });
+        goals.into_iter().find(|&goal| !self.has_reached(goal))
+    }
+
+    /// Fraction of the pixels that have a sample.
+    #[must_use]
+    pub fn coverage(&self) -> f64 {
+        let covered: usize = self.tiles.iter().map(Tile::covered).sum();
+        covered as f64 / (f64::from(self.size[0]) * f64::from(self.size[1]))
     }
 
     /// Samples per pixel, averaged over the picture.
@@ -198,14 +125,8 @@ impl Film {
         taken / (f64::from(self.size[0]) * f64::from(self.size[1]))
     }
 
-    fn pixels(&self) -> impl Iterator<Item = ([u32; 2], f64, &Pixel)> {
-        self.tiles.iter().flat_map(|tile| {
-            let [x, y] = tile.origin;
-            let positions = tile.order.iter().zip(&tile.pixels).enumerate();
-            positions.map(move |(i, (position, pixel))| {
-                ([x + position[0], y + position[1]], tile.samples_of(i), pixel)
-            })
-        })
+    fn pixels(&self) -> impl Iterator<Item = PixelEstimate> {
+        self.tiles.iter().flat_map(Tile::pixels)
     }
 
     /// The picture so far.
@@ -218,7 +139,7 @@ impl Film {
             variance: vec![[f32::INFINITY; 3]; pixels],
             depth: vec![f32::INFINITY; pixels],
         };
-        for ([x, y], n, pixel) in self.pixels() {
+        for PixelEstimate { position: [x, y], samples: n, estimate: pixel } in self.pixels() {
             let i = y as usize * self.size[0] as usize + x as usize;
             let [r, g, b] = pixel.mean;
             image.rgba[i] = [r, g, b, pixel.alpha];
@@ -237,8 +158,8 @@ impl Film {
     #[must_use]
     pub fn mean_radiance(&self) -> [f64; 3] {
         let mut sum = [0.0; 3];
-        for (_, _, pixel) in self.pixels() {
-            for (sum, &x) in sum.iter_mut().zip(&pixel.mean) {
+        for pixel in self.pixels() {
+            for (sum, &x) in sum.iter_mut().zip(&pixel.estimate.mean) {
                 *sum += f64::from(x);
             }
         }
@@ -255,7 +176,7 @@ impl Film {
         let whole = luminance_of(self.mean_radiance());
         let mut sum = 0.0;
         let mut count = 0.0;
-        for (_, n, pixel) in self.pixels() {
+        for PixelEstimate { samples: n, estimate: pixel, .. } in self.pixels() {
             let variance = f64::from(pixel.luminance_scatter.max(0.0)) / (n * (n - 1.0));
             let mean = luminance_of(pixel.mean.map(f64::from));
             sum += variance / (mean * mean + 0.01 * whole * whole).max(f64::MIN_POSITIVE);
@@ -268,15 +189,14 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::Level;
 
     /// A sample for every pixel of a tile.
     fn add_pass(tile: &mut Tile, sample: impl Fn([u32; 2], u32) -> PixelSample) {
         let before = tile.samples();
         while tile.samples() == before {
-            let (mut pixels, n) = tile.next(1);
-            let pixel = pixels.next().unwrap();
-            drop(pixels);
-            tile.add(&sample(pixel, n));
+            let pixel = tile.next(Goal::samples(before + 1), 1).next().unwrap();
+            tile.add(&sample(pixel, before));
         }
     }
 
@@ -307,16 +227,158 @@ mod tests {
     }
 
     #[test]
+    fn a_pass_goes_from_coarse_pixels_to_fine_ones() {
+        for size in [[16, 16], [37, 19], [3, 5]] {
+            let mut film = Film::new(size);
+            let inside = |at: u32, edge: u32| at < edge;
+            for more in Stride::ALL.map(Some).into_iter().chain([None]) {
+                let goal = Goal { samples: u32::from(more.is_none()), more };
+                let mut taken = 0;
+                for tile in film.tiles_mut() {
+                    while !tile.has_reached(goal) {
+                        let [x, y] = tile.next(goal, 7).next().unwrap();
+                        let step = more.map_or(1, Stride::pixels);
+                        assert!(inside(x, size[0]) && inside(y, size[1]));
+                        assert!(x % step == 0 && y % step == 0, "({x}, {y}) on the way to {goal:?}");
+                        tile.add(&PixelSample { radiance: Rgb::WHITE, ..PixelSample::default() });
+                    }
+                    assert!(tile.turn(goal).is_empty() && tile.next(goal, 7).len() == 0);
+                    taken += tile.taken();
+                }
+                let step = more.map_or(1, Stride::pixels);
+                assert_eq!(taken, size.iter().map(|edge| edge.div_ceil(step) as usize).product::<usize>());
+            }
+        }
+    }
+
+    #[test]
     fn tiles_may_have_different_numbers_of_samples() {
         let mut film = Film::new([32, 16]);
         let grey = |_: [u32; 2], _: u32| PixelSample { radiance: Rgb::WHITE, ..PixelSample::default() };
         add_pass(&mut film.tiles_mut()[1], grey);
-        assert_eq!((film.samples(), film.mean_samples()), (0, 0.5));
+        assert_eq!((film.samples(), film.mean_samples(), film.coverage()), (0, 0.5, 0.5));
         assert_eq!(film.relative_error(), None);
         for _ in 0..2 {
             film.tiles_mut().iter_mut().for_each(|t| add_pass(t, grey));
         }
         assert_eq!(film.relative_error(), Some(0.0));
+    }
+
+    /// The picture of one pixel with these samples.
+    fn of_samples(samples: impl IntoIterator<Item = f32>) -> Film {
+        let mut film = Film::new([1, 1]);
+        for x in samples {
+            film.tiles_mut()[0].add(&PixelSample { radiance: Rgb::splat(x), alpha: 1.0, depth: 3.0 * x });
+        }
+        film
+    }
+
+    /// A single precision mean that is updated sample by sample stops moving after 10^7 of them.
+    #[test]
+    fn no_sample_is_lost_after_ten_million() {
+        let (n, x) = (10_000_000, 0.1_f32);
+        let image = of_samples(std::iter::repeat_n(x, n)).image();
+        assert!((image.rgba[0][0] / x - 1.0).abs() < 1e-6, "{:?}", image.rgba);
+        assert!(image.variance[0][0] <= 1e-14, "{:?}", image.variance);
+        // The second half twice as bright.
+        let image = of_samples((0..n).map(|i| if i < n / 2 { x } else { 2.0 * x })).image();
+        assert!((image.rgba[0][0] / (1.5 * x) - 1.0).abs() < 1e-6, "{:?}", image.rgba);
+        let variance = 0.25 * x * x / n as f32;
+        assert!((image.variance[0][0] / variance - 1.0).abs() < 1e-5, "{:?}", image.variance);
+    }
+
+    /// Whatever the number of samples: between chunks, in one, and where nodes meet.
+    #[test]
+    fn chunks_and_nodes_give_the_statistics_of_all_samples() {
+        for n in [1, 2, 15, 16, 17, 63, 64, 65, 255, 256, 257, 1023, 1024, 1500] {
+            let samples =
+                || (0..n).map(|i: u32| ((i + 1).wrapping_mul(2_654_435_769) >> 8) as f32 / (1 << 24) as f32);
+            let image = of_samples(samples()).image();
+            let n = f64::from(n);
+            let mean = samples().map(f64::from).sum::<f64>() / n;
+            let scatter = samples().map(|x| (f64::from(x) - mean).powi(2)).sum::<f64>();
+            assert!((f64::from(image.rgba[0][1]) / mean - 1.0).abs() < 1e-6, "{n} samples");
+            assert!((f64::from(image.depth[0]) / (3.0 * mean) - 1.0).abs() < 1e-6, "{n} samples");
+            if n > 1.0 {
+                let variance = scatter / (n * (n - 1.0));
+                assert!((f64::from(image.variance[0][1]) / variance - 1.0).abs() < 1e-5, "{n} samples");
+            }
+        }
+    }
+
+    #[test]
+    fn a_pixels_memory_grows_with_the_logarithm_of_its_samples() {
+        let bytes = [1, 15, 16, 63, 64, 1 << 20].map(|samples| Film::bytes([1, 1], samples));
+        assert_eq!(bytes, [72, 72, 108, 108, 144, 72 + 36 * 9]);
+    }
+
+    /// A film whose tiles are apart by some samples, and of which some are in the middle of one.
+    fn uneven(size: [u32; 2], samples: u32) -> Film {
+        let mut film = Film::new(size);
+        let mut turn = 0_u32;
+        for tile in film.tiles_mut() {
+            turn += 1;
+            let more = if turn.is_multiple_of(3) { tile.pixel_count() as u32 / 2 } else { 0 };
+            let all = (samples + turn % 3) * tile.pixel_count() as u32 + more;
+            for i in 0..all {
+                let x = (i.wrapping_mul(2_654_435_769).wrapping_add(turn) >> 8) as f32 / (1 << 22) as f32;
+                tile.add(&PixelSample { radiance: Rgb::new(x, 2.0 - x, 0.3 * x), alpha: 1.0, depth: 1.0 });
+            }
+        }
+        film
+    }
+
+    #[test]
+    fn a_look_shows_what_a_file_would() {
+        let tone = Tone { curve: tone::ToneCurve::Agx, stops: 0.3 };
+        for samples in [1, 15, 16, 70, 300] {
+            let film = uneven([37, 50], samples);
+            let pixels: Vec<[f32; 3]> = film.image().rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+            let mut expected = vec![[0; 3]; pixels.len()];
+            tone.curve.encode(Level::best(), tone.stops, &pixels, &mut expected);
+            let mut viewer = Viewer::default();
+            viewer.look(&film, tone, Level::best());
+            assert_eq!((viewer.size(), viewer.changed().len()), ([37, 50], 12));
+            assert!(viewer.pixels() == expected.as_flattened(), "{samples} samples");
+        }
+    }
+
+    #[test]
+    fn a_look_renews_what_changed_and_a_missing_pixel_shows_its_blocks_first() {
+        let (tone, level) = (Tone { curve: tone::ToneCurve::Linear, stops: 0.0 }, Level::best());
+        let grey =
+            |x: u8| PixelSample { radiance: Rgb::splat(f32::from(x) / 40.0), ..PixelSample::default() };
+        let mut film = Film::new([32, 20]);
+        let mut viewer = Viewer::default();
+        viewer.look(&film, tone, level);
+        assert!(viewer.changed().is_empty() && viewer.pixels().iter().all(|&code| code == 0));
+        // One pixel of 64, each of its own grey.
+        let coarse = Goal { samples: 0, more: Some(Stride::Eight) };
+        let mut number = 0;
+        for tile in film.tiles_mut() {
+            while !tile.has_reached(coarse) {
+                number += 1;
+                tile.add(&grey(number));
+            }
+        }
+        viewer.look(&film, tone, level);
+        assert_eq!(viewer.changed(), [[0, 0], [16, 0], [0, 16], [16, 16]]);
+        let at = |viewer: &Viewer, [x, y]: [usize; 2]| viewer.pixels()[3 * (y * 32 + x)];
+        for [x, y] in [[7, 7], [8, 7], [31, 0], [17, 19], [15, 15]] {
+            assert_eq!(at(&viewer, [x, y]), at(&viewer, [x / 8 * 8, y / 8 * 8]), "({x}, {y})");
+        }
+        assert!(at(&viewer, [0, 0]) < at(&viewer, [8, 0]) && at(&viewer, [8, 0]) < at(&viewer, [8, 8]));
+        viewer.look(&film, tone, level);
+        assert!(viewer.changed().is_empty());
+        film.tiles_mut()[3].add(&grey(40));
+        viewer.look(&film, tone, level);
+        assert_eq!(viewer.changed(), [[16, 16]]);
+        // A new film without samples keeps the old picture until it has some; another exposure renews all.
+        let before = viewer.pixels().to_vec();
+        viewer.look(&Film::new([32, 20]), tone, level);
+        assert!(viewer.changed().is_empty() && viewer.pixels() == before);
+        viewer.look(&film, Tone { stops: 1.0, ..tone }, level);
+        assert_eq!(viewer.changed().len(), 4);
     }
 
     #[test]

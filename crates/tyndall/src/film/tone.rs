@@ -3,6 +3,15 @@
 //! A curve is for display only; the film records linear radiance.
 
 use crate::math::Rgb;
+use crate::simd::MOST_LANES;
+use crate::simd::{Kernel, Lanes, Level, exp2_unfused, log2_unfused};
+use fearless_simd::prelude::*;
+use std::ops::{Add, Div, Mul};
+
+/// Luminance of Rec. 709 primaries, as of [`Rgb::luminance`].
+const RED: f32 = 0.2126;
+const GREEN: f32 = 0.7152;
+const BLUE: f32 = 0.0722;
 
 /// How unbounded radiance is compressed into the range of a display.
 ///
@@ -29,12 +38,80 @@ impl ToneCurve {
     /// Negative and undefined channels show as black, infinite ones as the brightest value.
     #[must_use]
     pub fn map(self, linear: Rgb, exposure_stops: f32) -> Rgb {
-        let scene = expose(linear, exposure_stops);
-        match self {
-            Self::Agx => agx(scene),
-            Self::Linear => scene.map(encode_srgb),
-            Self::Reinhard => (scene / (1.0 + scene.luminance())).map(encode_srgb),
-            Self::Aces => scene.map(|x| encode_srgb(aces(x))),
+        let pixels = &[linear.to_array()];
+        let mut codes = [[0.0; 3]];
+        Level::best().run(Encode { curve: self, gain: exposure_stops.exp2(), pixels, codes: &mut codes });
+        Rgb::from(codes[0])
+    }
+
+    /// The same for many pixels, as the nearest of 256 code values. Every vector level gives the same bytes.
+    ///
+    /// # Panics
+    /// If there are not as many `codes` as `pixels`.
+    pub fn encode(self, level: Level, exposure_stops: f32, pixels: &[[f32; 3]], codes: &mut [[u8; 3]]) {
+        assert_eq!(pixels.len(), codes.len(), "pixels and their codes");
+        level.run(Encode { curve: self, gain: exposure_stops.exp2(), pixels, codes });
+    }
+}
+
+/// The type of a code value.
+trait Code: Copy {
+    /// From a value in [0, 1], and the same as one of 256 levels.
+    fn new(value: f32, level: i32) -> Self;
+}
+
+impl Code for f32 {
+    #[inline(always)]
+    fn new(value: f32, _: i32) -> Self {
+        value
+    }
+}
+
+impl Code for u8 {
+    #[inline(always)]
+    fn new(_: f32, level: i32) -> Self {
+        level.to_le_bytes()[0]
+    }
+}
+
+/// Encodes pixels, a vector of them at a time.
+struct Encode<'a, C> {
+    curve: ToneCurve,
+    gain: f32,
+    pixels: &'a [[f32; 3]],
+    codes: &'a mut [[C; 3]],
+}
+
+impl<C: Code> Kernel for Encode<'_, C> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, simd: S) {
+        let Self { curve, gain, pixels, codes } = self;
+        for (pixels, codes) in pixels.chunks(S::WIDTH).zip(codes.chunks_mut(S::WIDTH)) {
+            // Lanes beyond the last pixel are black.
+            let mut linear = [[0.0; MOST_LANES]; 3];
+            for (lane, [r, g, b]) in pixels.iter().enumerate() {
+                (linear[0][lane], linear[1][lane], linear[2][lane]) = (*r * gain, *g * gain, *b * gain);
+            }
+            let r = clip(simd, S::f32s::from_slice(simd, &linear[0][..S::WIDTH]), BRIGHTEST);
+            let g = clip(simd, S::f32s::from_slice(simd, &linear[1][..S::WIDTH]), BRIGHTEST);
+            let b = clip(simd, S::f32s::from_slice(simd, &linear[2][..S::WIDTH]), BRIGHTEST);
+            let shown = match curve {
+                ToneCurve::Agx => agx(simd, [r, g, b]),
+                ToneCurve::Linear => encode_all(simd, [r, g, b]),
+                ToneCurve::Reinhard => {
+                    let white = r * RED + g * GREEN + b * BLUE + 1.0;
+                    encode_all(simd, [r / white, g / white, b / white])
+                }
+                ToneCurve::Aces => encode_all(simd, [aces(r), aces(g), aces(b)]),
+            };
+            for (channel, shown) in shown.into_iter().enumerate() {
+                let levels: S::i32s = (shown * 255.0 + 0.5).to_int();
+                for (lane, code) in codes.iter_mut().enumerate() {
+                    code[channel] = C::new(shown.as_slice()[lane], levels.as_slice()[lane]);
+                }
+            }
         }
     }
 }
@@ -42,7 +119,7 @@ impl ToneCurve {
 /// The sRGB code value of a linear one [IEC 61966-2-1]; values outside [0, 1] are clipped, NaN becomes 0.
 #[must_use]
 pub fn encode_srgb(linear: f32) -> f32 {
-    let x = clip(linear, 1.0);
+    let x = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
     if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
 }
 
@@ -56,19 +133,34 @@ pub fn quantize(x: f32) -> u8 {
 /// Scene values are clipped to this before a curve: all curves are flat far below it, and its square is finite.
 const BRIGHTEST: f32 = 1e10;
 
-fn expose(linear: Rgb, stops: f32) -> Rgb {
-    let gain = stops.exp2();
-    linear.map(|x| clip(x * gain, BRIGHTEST))
+/// Clamps to [0, high]; NaN becomes 0.
+#[inline(always)]
+fn clip<S: Lanes>(simd: S, x: S::f32s, high: f32) -> S::f32s {
+    let zero = S::f32s::splat(simd, 0.0);
+    x.simd_gt(zero).select(x.min(high), zero)
 }
 
-/// Clamps to [0, high]; unlike `clamp`, maps NaN to 0.
-fn clip(x: f32, high: f32) -> f32 {
-    if x > 0.0 { x.min(high) } else { 0.0 }
+/// [`encode_srgb`] in lanes; the root is computed from logarithms.
+#[inline(always)]
+fn encode_lanes<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
+    let x = clip(simd, x, 1.0);
+    let root = exp2_unfused(simd, log2_unfused(simd, x.max(f32::MIN_POSITIVE)) * (1.0 / 2.4));
+    let linear = S::f32s::splat(simd, 0.003_130_8);
+    // Rounding may exceed 1.
+    x.simd_le(linear).select(x * 12.92, root * 1.055 - 0.055).min(1.0)
+}
+
+#[inline(always)]
+fn encode_all<S: Lanes>(simd: S, [r, g, b]: [S::f32s; 3]) -> [S::f32s; 3] {
+    [encode_lanes(simd, r), encode_lanes(simd, g), encode_lanes(simd, b)]
 }
 
 /// \[Narkowicz16\]: five numbers fitted to the reference and output device transforms.
-fn aces(x: f32) -> f32 {
-    (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14)
+#[inline(always)]
+fn aces<V: Copy + Mul<f32, Output = V> + Mul<V, Output = V> + Add<f32, Output = V> + Div<V, Output = V>>(
+    x: V,
+) -> V {
+    (x * (x * 2.51 + 0.03)) / (x * (x * 2.43 + 0.59) + 0.14)
 }
 
 type Matrix = [[f32; 3]; 3];
@@ -103,22 +195,32 @@ const fn rows_to_one(rows: Matrix) -> Matrix {
 }
 
 /// \[Wrensch23\]'s fit of the base look of \[Sobotka22\]; the output is already encoded for the display.
-fn agx(scene: Rgb) -> Rgb {
+#[inline(always)]
+fn agx<S: Lanes>(simd: S, scene: [S::f32s; 3]) -> [S::f32s; 3] {
+    let [r, g, b] = multiply(AGX_INSET, scene);
+    let [r, g, b] = multiply(AGX_OUTSET, [agx_of(simd, r), agx_of(simd, g), agx_of(simd, b)]);
+    [clip(simd, r, 1.0), clip(simd, g, 1.0), clip(simd, b, 1.0)]
+}
+
+/// One channel between the two matrices.
+#[inline(always)]
+fn agx_of<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
     let [low, high] = AGX_STOPS;
-    // log2 of zero is minus infinity, which is clamped to the bottom of the range.
-    let log = multiply(AGX_INSET, scene).map(|x| (x.log2().clamp(low, high) - low) / (high - low));
-    multiply(AGX_OUTSET, log.map(agx_contrast)).map(|x| x.clamp(0.0, 1.0))
+    let log = log2_unfused(simd, x.max(f32::MIN_POSITIVE)).max(low).min(high);
+    agx_contrast((log - low) * (1.0 / (high - low)))
 }
 
 /// The sigmoid over the log range, as a polynomial of degree 6 \[Wrensch23\].
-fn agx_contrast(x: f32) -> f32 {
-    let higher = ((15.5 * x - 40.14) * x + 31.96) * x - 6.868;
-    ((higher * x + 0.429_8) * x + 0.119_1) * x - 0.002_32
+#[inline(always)]
+fn agx_contrast<V: Copy + Mul<f32, Output = V> + Mul<V, Output = V> + Add<f32, Output = V>>(x: V) -> V {
+    let higher = ((x * 15.5 + -40.14) * x + 31.96) * x + -6.868;
+    ((higher * x + 0.429_8) * x + 0.119_1) * x + -0.002_32
 }
 
-fn multiply(rows: Matrix, c: Rgb) -> Rgb {
-    let [r, g, b] = rows.map(|[x, y, z]| x * c.r + y * c.g + z * c.b);
-    Rgb::new(r, g, b)
+#[inline(always)]
+fn multiply<V: Copy + Mul<f32, Output = V> + Add<V, Output = V>>(rows: Matrix, [r, g, b]: [V; 3]) -> [V; 3] {
+    let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = rows;
+    [r * ax + g * ay + b * az, r * bx + g * by + b * bz, r * cx + g * cy + b * cz]
 }
 
 #[cfg(test)]
@@ -140,6 +242,48 @@ mod tests {
             assert_eq!(shown(ToneCurve::Linear, grey), [level; 3]);
         }
         assert_eq!(shown(ToneCurve::Linear, Rgb::splat(0.18)), [118; 3]);
+    }
+
+    /// Pixels of all magnitudes and odd ones, more than fill the last vector.
+    fn pixels() -> Vec<[f32; 3]> {
+        let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, 1e-40, -1.0, 0.0, 1.0];
+        let of = |i: u32, turn: u32| match i.wrapping_mul(turn) >> 8 {
+            bits if bits % 50 == 0 => odd[bits as usize / 50 % 8],
+            bits => (bits as f32 / (1 << 24) as f32 * 40.0 - 30.0).exp2(),
+        };
+        (1..20_000).map(|i| [2_654_435_769, 2_246_822_519, 3_266_489_917].map(|turn| of(i, turn))).collect()
+    }
+
+    #[test]
+    fn every_level_gives_the_same_bytes_and_they_are_those_of_the_single_pixel() {
+        let pixels = pixels();
+        for curve in CURVES {
+            for stops in [0.0, -1.3, 4.0] {
+                let encoded = |level: Level| {
+                    let mut codes = vec![[0; 3]; pixels.len()];
+                    curve.encode(level, stops, &pixels, &mut codes);
+                    codes
+                };
+                let scalar = encoded(Level::available()[0]);
+                for level in Level::available() {
+                    assert!(encoded(level) == scalar, "{curve:?} with {level:?}");
+                }
+                for (pixel, codes) in pixels.iter().zip(&scalar) {
+                    let alone = curve.map(Rgb::from(*pixel), stops).to_array().map(quantize);
+                    assert_eq!(alone, *codes, "{curve:?} of {pixel:?}");
+                }
+            }
+        }
+    }
+
+    /// The curve for sRGB in lanes against the standard library's power function.
+    #[test]
+    fn srgb_in_lanes_is_srgb() {
+        for i in 0..100_000 {
+            let x = i as f32 / 99_999.0;
+            let found = ToneCurve::Linear.map(Rgb::splat(x), 0.0).g;
+            assert!((found - encode_srgb(x)).abs() < 5e-7, "{found} at {x}");
+        }
     }
 
     #[test]

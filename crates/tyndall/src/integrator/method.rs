@@ -1,7 +1,7 @@
 //! The interface of a rendering method to everything outside its folder.
 
 use super::{Limits, Stop};
-use crate::film::Tile;
+use crate::film::{Goal, Tile};
 use crate::scene::{Difference, MethodChoice, MethodSettings, Scene};
 use crate::simd::Level;
 use schemars::JsonSchema;
@@ -102,9 +102,9 @@ pub trait Method: Sized + Send + Sync + 'static {
         u32::MAX
     }
 
-    /// Adds samples to a tile until every pixel has `samples`, or until `stop`. Unfinished work is kept in `state` and
+    /// Adds samples to the pixels of a tile until it reaches `goal`, or until `stop`. Unfinished work is kept in `state` and
     /// continued by the next call, so that time slices of any length make progress.
-    fn refine(&self, scene: &Scene, tile: &mut Tile, state: &mut Self::TileState, samples: u32, stop: &Stop);
+    fn refine(&self, scene: &Scene, tile: &mut Tile, state: &mut Self::TileState, goal: Goal, stop: &Stop);
 
     /// What was computed and is kept; `pixels` gives the number of samples that the film has taken.
     fn report(&self, tiles: &[Self::TileState], pixels: &PixelCounts) -> MethodReport {

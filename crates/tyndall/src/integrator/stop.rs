@@ -57,12 +57,19 @@ impl<'a> Stop<'a> {
         if self.expired.get() || self.cancel.load(Ordering::Relaxed) {
             return true;
         }
-        let Some(deadline) = self.deadline else { return false };
-        let asked = self.asked.replace(self.asked.get().wrapping_add(1));
-        if asked.is_multiple_of(QUESTIONS) {
-            self.expired.set(Instant::now() >= deadline);
+        if self.deadline.is_none() {
+            return false;
         }
-        self.expired.get()
+        let asked = self.asked.replace(self.asked.get().wrapping_add(1));
+        asked.is_multiple_of(QUESTIONS) && self.reached_now()
+    }
+
+    /// The same for work that polls seldom: reads the clock each time.
+    #[must_use]
+    pub fn reached_now(&self) -> bool {
+        let expired = self.deadline.is_some_and(|deadline| Instant::now() >= deadline);
+        self.expired.set(self.expired.get() || expired);
+        self.expired.get() || self.cancel.load(Ordering::Relaxed)
     }
 }
 
@@ -73,16 +80,22 @@ mod tests {
 
     #[test]
     fn a_deadline_and_a_cancellation_are_seen() {
-        assert!(!Stop::never().reached());
+        assert!(!Stop::never().reached() && !Stop::never().reached_now());
         let cancel = AtomicBool::new(false);
         assert!(Stop::when(&cancel, Some(Instant::now())).reached());
         let stop = Stop::when(&cancel, Some(Instant::now() + Duration::from_secs(3600)));
-        assert!((0..100).all(|_| !stop.reached()));
+        assert!((0..100).all(|_| !stop.reached() && !stop.reached_now()));
         cancel.store(true, Ordering::Relaxed);
         assert!(stop.reached());
         let soon = Instant::now() + Duration::from_millis(2);
         let stop = Stop::when(&NEVER, Some(soon));
         while !stop.reached() {}
-        assert!(Instant::now() >= soon && stop.reached());
+        assert!(Instant::now() >= soon && stop.reached() && stop.reached_now());
+        // Seen by the first of these polls, and by the sixteenth of the others at the latest.
+        let soon = Instant::now() + Duration::from_millis(2);
+        let stop = Stop::when(&NEVER, Some(soon));
+        assert!(!stop.reached());
+        while Instant::now() < soon {}
+        assert!(stop.reached_now() && stop.reached());
     }
 }

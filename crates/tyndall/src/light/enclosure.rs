@@ -60,13 +60,11 @@ impl Enclosure {
         let axes = DMat3::from_cols_array_2d(&grid.direction()).transpose();
         let (dims, spacing) = (grid.dims(), grid.spacing());
         let edges = [0, 1, 2].map(|a| axes.col(a) * (dims[a] as f64 * spacing[a]));
-        let half_voxel = axes * DVec3::from_array(spacing) * 0.5;
-        let corner = DVec3::from_array(grid.origin()) - half_voxel;
-
         let [x, y, z] = edges;
+        // The world's origin is the centre of the box.
+        let (center, corner) = (DVec3::ZERO, (x + y + z) * -0.5);
         let determinant = x.cross(y).dot(z);
         let normals = [y.cross(z), z.cross(x), x.cross(y)].map(|n| n * determinant.signum());
-        let center = corner + (x + y + z) * 0.5;
         let radius =
             [x + y + z, x + y - z, x - y + z, y + z - x].map(DVec3::length).into_iter().fold(0.0, f64::max);
         Self { corner, edges, normals, volume: determinant.abs(), center, radius: 0.5 * radius }

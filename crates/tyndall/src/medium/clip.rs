@@ -115,8 +115,8 @@ mod tests {
         let direction = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]];
         let grid =
             Grid::new([10, 10, 10], [0.5, 1.0, 2.0], direction, [1.0, 2.0, 3.0], Space::Plain).unwrap();
-        let b = Bounds::new(Vec3::new(0.0, 2.5, 4.0), Vec3::new(3.0, 8.0, 20.0));
-        let point = Vec3::new(1.0, 5.0, 9.0);
+        let b = Bounds::new(grid.to_world([0.0, 2.5, 4.0]), grid.to_world([3.0, 8.0, 20.1]));
+        let point = grid.to_world([1.0, 5.0, 9.0]);
         let normal = Vec3::new(1.0, -0.5, 0.25);
         let clip = Clip::new(&grid, &[ClipShape::Box(b), ClipShape::Plane { point, normal }]);
         let (mut kept, mut cut) = (0, 0);

@@ -4,9 +4,10 @@
 //! the largest extinction. Where these agree the cell is homogeneous and nothing is looked up. A step too
 //! short for single precision still advances by one unit in the last place, so that no flight gets stuck.
 
-use super::{CellStretch, MOST_LANES, Medium, Track};
+use super::{CellStretch, Medium, Track};
 use crate::math::Vec3;
 use crate::sampling::Stream;
+use crate::simd::MOST_LANES;
 use crate::simd::{Kernel, Lanes, Level};
 use fearless_simd::prelude::*;
 

@@ -8,11 +8,8 @@ use super::march_notes::MarchNotes;
 use super::skip::Skip;
 use super::{Medium, Track};
 use crate::math::{Ray, cast};
-use crate::simd::{Kernel, Lanes, Level};
+use crate::simd::{Kernel, Lanes, Level, MOST_LANES};
 use fearless_simd::prelude::*;
-
-/// Most lanes of any level.
-pub(crate) const MOST_LANES: usize = 16;
 
 /// The steps of one track.
 #[derive(Clone, Copy, Debug, Default)]

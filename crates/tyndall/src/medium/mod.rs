@@ -15,7 +15,7 @@ pub use clip::{Clip, ClipShape};
 pub use free_flight::Collision;
 pub(crate) use free_flight::FlightNotes;
 pub use majorants::{CellStretch, CellWalk, MajorantGrid};
-pub(crate) use march::{MOST_LANES, PacketMarch, PacketSample};
+pub(crate) use march::{PacketMarch, PacketSample};
 pub(crate) use march_notes::MarchNotes;
 pub use marched_flight::MarchedCollision;
 

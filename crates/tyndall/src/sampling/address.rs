@@ -1,8 +1,8 @@
 //! Where the random numbers of a picture lie: the one table of what they are for, with the key and the counter \[Salmon11\] of each.
 //!
 //! Under a seed, five words tell numbers apart: the pass, which goes into the key, and the four words of the counter. The first of
-//! these counts the blocks of a [`Stream`], without end; what is drawn once may give it a meaning. A row says what values its
-//! fields may have; the tests below hold every two rows apart, but for the overlaps that they name.
+//! these counts the blocks of a [`Stream`], without end; what is drawn once may give it a meaning. The last begins with the
+//! [`Kind`] of the purpose, which keeps any two purposes apart; the tests below hold them to that.
 
 use super::philox;
 use super::stream::{Stream, key};
@@ -28,8 +28,27 @@ const LATE_BOUNCES: RangeInclusive<u32> = SOBOL_BOUNCES..=*BOUNCES.end();
 const SEQUENCES_OF_SAMPLES: RangeInclusive<u32> = 0..=*ANY.end() / SEQUENCE;
 const SEQUENCES_OF_PATHS: RangeInclusive<u32> = 0..=*PATHS.end() / SEQUENCE;
 
-/// No bounce and no index of a light reaches it.
+/// No index of a light reaches it.
 const TOP_BIT: u32 = 1 << 31;
+
+/// What numbers are for, in the upper bits of the counter's last word.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    CameraTracking,
+    CameraScramble,
+    ViewRay,
+    LightScramble,
+    LightTracking,
+    LightLateBounce,
+    MatterEmission,
+}
+
+impl Kind {
+    /// The counter's last word; a bounce takes its lower 28 bits.
+    const fn at(self, bounce: u32) -> u32 {
+        (self as u32) << 28 | bounce
+    }
+}
 
 /// Each row: a variant, the values that its fields may have, and the words that follow from them. Each word shall grow with one field.
 macro_rules! table {
@@ -73,22 +92,26 @@ table! {
     /// What random numbers are for.
     Purpose.address -> Address {
         /// Tracking of a camera path, its draws from glowing matter, and its bounces past the Sobol sequence.
-        CameraTracking { pixel in PIXELS, sample in ANY } => stream(0, [pixel, sample, 0]);
+        CameraTracking { pixel in PIXELS, sample in ANY } =>
+            stream(0, [pixel, sample, Kind::CameraTracking.at(0)]);
         /// Scramble of the Sobol sequence of camera paths.
-        CameraScramble { pixel in PIXELS, sequence in SEQUENCES_OF_SAMPLES } => once(0, [pixel, sequence, 0, 1]);
+        CameraScramble { pixel in PIXELS, sequence in SEQUENCES_OF_SAMPLES } =>
+            once(0, [pixel, sequence, 0, Kind::CameraScramble.at(0)]);
         /// A view ray of a refinement pass: its place in the pixel, on the lens, and its steps.
-        ViewRay { pixel in PIXELS, sample in ANY } => stream(0, [pixel, sample, u32::MAX]);
+        ViewRay { pixel in PIXELS, sample in ANY } =>
+            stream(0, [pixel, sample, Kind::ViewRay.at(0)]);
         /// Scramble of the Sobol sequence of light paths.
         LightScramble { pass in ANY, emitter in ANY, sequence in SEQUENCES_OF_PATHS } =>
-            once(pass, [emitter, sequence, 0, 2]);
+            once(pass, [emitter, sequence, 0, Kind::LightScramble.at(0)]);
         /// Tracking of a flight of a light path.
         LightTracking { pass in ANY, emitter in ANY, path in PATHS, bounce in BOUNCES } =>
-            stream(pass, [emitter, path, bounce]);
+            stream(pass, [emitter, path, Kind::LightTracking.at(bounce)]);
         /// A scattering of a light path past the Sobol sequence: apart from the flight's numbers, whose count is not known.
         LightLateBounce { pass in ANY, emitter in ANY, path in PATHS, bounce in LATE_BOUNCES } =>
-            stream(pass, [emitter, path, bounce | TOP_BIT]);
+            stream(pass, [emitter, path, Kind::LightLateBounce.at(bounce)]);
         /// Where in a glowing cell a light path begins.
-        MatterEmission { pass in ANY, path in PATHS } => stream(pass, [Emitter::Matter.number(), path, u32::MAX]);
+        MatterEmission { pass in ANY, path in PATHS } =>
+            stream(pass, [Emitter::Matter.number(), path, Kind::MatterEmission.at(0)]);
     }
 }
 
@@ -96,12 +119,12 @@ table! {
     /// What sends light paths, and the word that tells its random numbers from those of others.
     Emitter.number -> u32 {
         /// A light without a name of its own: by its place among the lights.
-        Unnamed { index in 0..=TOP_BIT - 1 } => index;
+        Unnamed { index in 0..=TOP_BIT - 2 } => index;
         /// A light with a name: by a hash, so that it keeps its numbers when other lights come and go. One pair of names in
         /// 2^31 shares them.
         Named { hash in ANY } => hash | TOP_BIT;
         /// All glowing matter.
-        Matter => u32::MAX;
+        Matter => TOP_BIT - 1;
     }
 }
 

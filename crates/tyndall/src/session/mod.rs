@@ -1,6 +1,6 @@
 //! A session: a scene, its integrator and the film, refined in slices of time.
 
-use crate::film::{Film, Image};
+use crate::film::{Film, Goal, Image, Stride, Tone, Viewer};
 use crate::integrator::{
     Edited, Engine, KeptItems, Limits, MethodReport, PixelCounts, Resources, WorkShare, method_of,
 };
@@ -15,6 +15,8 @@ use std::time::{Duration, Instant};
 pub struct Budget {
     /// Number of samples to reach in every pixel.
     pub samples: u32,
+    /// Pixels that are to have one sample more.
+    pub more: Option<Stride>,
     /// Time at which to stop; some pixels may then have one sample more than others.
     pub deadline: Option<Instant>,
     /// Set by another thread to stop soon.
@@ -25,7 +27,17 @@ impl Budget {
     /// This many samples in every pixel, without a time limit.
     #[must_use]
     pub fn samples(samples: u32) -> Self {
-        Self { samples, deadline: None, cancel: Arc::default() }
+        Self { samples, more: None, deadline: None, cancel: Arc::default() }
+    }
+
+    /// The first sample of some pixels: a coarse picture.
+    #[must_use]
+    pub fn coarse(stride: Stride) -> Self {
+        Self { more: Some(stride), ..Self::samples(0) }
+    }
+
+    fn goal(&self) -> Goal {
+        Goal { samples: self.samples, more: self.more }
     }
 }
 
@@ -37,6 +49,8 @@ pub struct Progress {
     pub samples: u32,
     /// Samples per pixel on average.
     pub mean_samples: f64,
+    /// Fraction of the pixels that have a sample.
+    pub coverage: f64,
 }
 
 /// Seconds that a stage of the work took.
@@ -170,13 +184,18 @@ impl Session {
         self.film.image()
     }
 
-    /// Renders until the budget is spent, pass by pass over all tiles, so that every pixel has a sample as early as
-    /// possible. Every sample is determined by its pixel and number, so the picture does not depend on threads or
-    /// slices.
+    /// Brings a viewer's picture up to date, on the session's threads.
+    pub fn look(&self, viewer: &mut Viewer, tone: Tone) {
+        self.threads.install(|| viewer.look(&self.film, tone, self.resources.level));
+    }
+
+    /// Renders until the budget is spent, pass by pass over all tiles, and the first pass from coarse pixels to fine ones, so that
+    /// the whole picture shows as early as possible. Every sample is determined by its pixel and number, so the finished picture
+    /// does not depend on threads or slices.
     pub fn refine(&mut self, budget: &Budget) -> Progress {
         let limits = Limits { cancel: &budget.cancel, deadline: budget.deadline };
         let Self { scene, engine, film, threads, spent, .. } = self;
-        while film.samples() < budget.samples && !limits.stop().reached() {
+        while !film.has_reached(budget.goal()) && !limits.stop().reached() {
             let so_far = film.samples();
             let begun = Instant::now();
             let prepared = threads.install(|| engine.prepare(scene, so_far, &limits));
@@ -186,9 +205,11 @@ impl Session {
             }
             // Later, several passes at once do not delay the picture noticeably, and threads wait less for each other.
             let passes = (so_far / 4).clamp(1, 16).min(engine.samples_at_once());
-            let pass = so_far.saturating_add(passes).min(budget.samples);
+            let pass = Goal::samples(so_far.saturating_add(passes));
+            let next = if so_far == 0 { film.coarse_goal().unwrap_or(pass) } else { pass };
+            let goal = if next.is_beyond(budget.goal()) { budget.goal() } else { next };
             let begun = Instant::now();
-            threads.install(|| engine.refine(scene, film.tiles_mut(), pass, &limits));
+            threads.install(|| engine.refine(scene, film.tiles_mut(), goal, &limits));
             spent.sampling += begun.elapsed();
         }
         self.progress()
@@ -197,7 +218,11 @@ impl Session {
     /// Progress so far.
     #[must_use]
     pub fn progress(&self) -> Progress {
-        Progress { samples: self.film.samples(), mean_samples: self.film.mean_samples() }
+        Progress {
+            samples: self.film.samples(),
+            mean_samples: self.film.mean_samples(),
+            coverage: self.film.coverage(),
+        }
     }
 
     /// Noise of the picture so far, see [`Film::relative_error`]; `None` for a method without noise, whose

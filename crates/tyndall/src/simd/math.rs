@@ -26,6 +26,38 @@ pub(crate) fn one_minus_exp<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
 const LN_2_HIGH: f32 = 0.693_359_4;
 const LN_2_LOW: f32 = -2.121_944_4e-4;
 
+/// `log2(x)` of normal positive numbers, to 3e-7 of itself or of 1. Nothing is fused, so that every level gives the same bits.
+#[inline(always)]
+pub(crate) fn log2_unfused<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
+    /// Of the square root of a half, above which mantissas are taken, and below twice which.
+    const ROOT: u32 = 0x3f35_04f3;
+    let bits: S::i32s = x.to_bits().bitcast();
+    let root = ROOT.cast_signed();
+    let exponent: S::i32s = (bits - root) >> 23;
+    let mantissa: S::u32s = (bits - (exponent << 23)).bitcast();
+    let m = S::f32s::from_bits(mantissa);
+    // log(m) = 2 artanh((m - 1) / (m + 1)).
+    let one = S::f32s::splat(simd, 1.0);
+    let s = (m - one) / (m + one);
+    let z = s * s;
+    let series = ((z * (1.0 / 9.0) + 1.0 / 7.0) * z + 1.0 / 5.0) * z + 1.0 / 3.0;
+    (series * z + 1.0) * s * (2.0 * std::f32::consts::LOG2_E) + exponent.to_float::<S::f32s>()
+}
+
+/// `2^x` for `x` from -126 to 127, to 3e-7 of itself. Nothing is fused, so that every level gives the same bits.
+#[inline(always)]
+pub(crate) fn exp2_unfused<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
+    let n = x.round_ties_even();
+    let r = (x - n) * std::f32::consts::LN_2;
+    let mut series = S::f32s::splat(simd, 1.0 / 5040.0);
+    for coefficient in [1.0 / 720.0, 1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0] {
+        series = series * r + coefficient;
+    }
+    let power: S::i32s = (n.to_int::<S::i32s>() + 127) << 23;
+    let power: S::u32s = power.bitcast();
+    series * S::f32s::from_bits(power)
+}
+
 /// Unpacks [`PackedDirection`](crate::math::PackedDirection)s to unit vectors.
 #[inline(always)]
 pub(crate) fn unpack_directions<S: Lanes>(simd: S, words: S::u32s) -> [S::f32s; 3] {
@@ -102,6 +134,47 @@ mod tests {
                 let expected = -(-f64::from(x)).exp_m1();
                 let apart = (f64::from(found) - expected).abs();
                 assert!(apart <= 3e-7 * expected, "{found}, expected {expected} at {x} with {level:?}");
+            }
+        }
+    }
+
+    /// A function of each number.
+    struct Each<'a>(&'a [f32], bool);
+
+    impl Kernel for Each<'_> {
+        type Output = Vec<f32>;
+
+        #[inline(always)]
+        fn run<S: Lanes>(self, simd: S) -> Vec<f32> {
+            let Self(numbers, is_log) = self;
+            let of = |x: &[f32]| {
+                let x = S::f32s::from_slice(simd, x);
+                if is_log { log2_unfused(simd, x) } else { exp2_unfused(simd, x) }.as_slice().to_vec()
+            };
+            numbers.chunks_exact(S::WIDTH).flat_map(of).collect()
+        }
+    }
+
+    #[test]
+    fn logarithms_and_powers_are_right_and_alike_on_every_level() {
+        let numbers: Vec<f32> = (0..16_000).map(|i| cast::single(1.2e-38 * 1.011_f64.powi(i))).collect();
+        let exponents: Vec<f32> = (0..16_000).map(|i| -126.0 + i as f32 * (252.9 / 16_000.0)).collect();
+        let first = Level::available()[0];
+        for level in Level::available() {
+            let (logs, powers) = (level.run(Each(&numbers, true)), level.run(Each(&exponents, false)));
+            assert_eq!(logs, first.run(Each(&numbers, true)), "{level:?}");
+            assert_eq!(powers, first.run(Each(&exponents, false)), "{level:?}");
+            for (&x, found) in numbers.iter().zip(logs) {
+                let expected = f64::from(x).log2();
+                let apart = (f64::from(found) - expected).abs();
+                assert!(apart <= 3e-7 * expected.abs().max(1.0), "{found}, expected {expected} at {x}");
+            }
+            for (&x, found) in exponents.iter().zip(powers) {
+                let expected = f64::from(x).exp2();
+                assert!(
+                    (f64::from(found) / expected - 1.0).abs() < 3e-7,
+                    "{found}, expected {expected} at {x}"
+                );
             }
         }
     }

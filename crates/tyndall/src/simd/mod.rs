@@ -9,11 +9,14 @@ mod gather;
 mod math;
 
 pub(crate) use gather::Lanes;
-pub(crate) use math::{one_minus_exp, unpack_directions};
+pub(crate) use math::{exp2_unfused, log2_unfused, one_minus_exp, unpack_directions};
 
 use fearless_simd as simd;
 use std::fmt;
 use std::str::FromStr;
+
+/// Maximum number of lanes of any level.
+pub(crate) const MOST_LANES: usize = 16;
 
 /// A set of vector instructions that this processor has.
 #[derive(Clone, Copy)]

@@ -23,13 +23,17 @@ impl Space {
 }
 
 /// A regular grid of voxels: index space has integer coordinates at voxel centres, and
-/// `world = origin + direction * (spacing * index)`.
+/// `origin + direction * (spacing * index)` are the coordinates of the file and of documents, in double precision.
+///
+/// The renderer's world has the same axes and units, but its origin is the centre of the volume's box: single precision is spent
+/// on the volume, however far from the file's origin it is. [`Self::to_world`] leads there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     dims: [usize; 3],
     spacing: [f64; 3],
     direction: [[f64; 3]; 3],
     origin: [f64; 3],
+    center: [f64; 3],
     space: Space,
     index_to_world: Affine3A,
     world_to_index: Affine3A,
@@ -100,16 +104,18 @@ impl Grid {
         }
         let linear = axes * DMat3::from_diagonal(DVec3::from_array(spacing));
         let inverse = linear.inverse();
-        let shift = DVec3::from_array(origin);
+        let middle = DVec3::from_array(dims.map(|n| 0.5 * (n as f64 - 1.0)));
+        let center = (DVec3::from_array(origin) + linear * middle).to_array();
         let single = |m: DMat3, t: DVec3| Affine3A::from_mat3_translation(m.as_mat3(), t.as_vec3());
         Ok(Self {
             dims,
             spacing,
             direction,
             origin,
+            center,
             space,
-            index_to_world: single(linear, shift),
-            world_to_index: single(inverse, -(inverse * shift)),
+            index_to_world: single(linear, -(linear * middle)),
+            world_to_index: single(inverse, middle),
             gradient_to_world: inverse.transpose().as_mat3(),
             voxel_size: cast::single(linear.determinant().abs().cbrt()),
         })
@@ -145,10 +151,34 @@ impl Grid {
         self.direction
     }
 
-    /// World position of the centre of voxel (0, 0, 0).
+    /// Position of the centre of voxel (0, 0, 0), in the file's coordinates.
     #[must_use]
     pub fn origin(&self) -> [f64; 3] {
         self.origin
+    }
+
+    /// The centre of the medium's box, in the file's coordinates: the origin of the renderer's world.
+    #[must_use]
+    pub fn center(&self) -> [f64; 3] {
+        self.center
+    }
+
+    /// A position in the file's coordinates as one of the renderer's world.
+    #[must_use]
+    pub fn to_world(&self, position: [f64; 3]) -> Vec3 {
+        (DVec3::from_array(position) - DVec3::from_array(self.center)).as_vec3()
+    }
+
+    /// Lowest and highest corner of the smallest box around the medium that is parallel to the file's axes, in the file's
+    /// coordinates.
+    #[must_use]
+    pub fn file_bounds(&self) -> [[f64; 3]; 2] {
+        // Half the box's extent along an axis: what its three edges contribute.
+        let half = |axis: usize| -> f64 {
+            let edge = |a: usize| self.direction[axis][a] * self.spacing[a] * self.dims[a] as f64;
+            0.5 * (0..3).map(|a| edge(a).abs()).sum::<f64>()
+        };
+        [-1.0, 1.0].map(|side| std::array::from_fn(|axis| self.center[axis] + side * half(axis)))
     }
 
     /// What the axes mean.
@@ -233,13 +263,25 @@ mod tests {
             Grid::new([4, 5, 6], [0.5, 2.0, 3.0], direction, [10.0, -20.0, 5.0], Space::Anatomical).unwrap();
         let p = Vec3::new(1.0, 2.5, 3.0);
         let world = grid.index_to_world(p);
-        let expected_x = 10.0 + c * 0.5 - s * 5.0;
-        assert!((f64::from(world.x) - expected_x).abs() < 1e-5, "{world}");
+        let in_file = [10.0 + c * 0.5 - s * 5.0, -20.0 + s * 0.5 + c * 5.0, 5.0 - 9.0];
+        assert!((grid.to_world(in_file) - world).length() < 1e-5, "{world}");
+        assert!(grid.world_bounds().center().length() < 1e-5);
         assert!((grid.world_to_index(world) - p).length() < 1e-4);
         assert!((grid.voxel_size() - 3.0_f32.cbrt()).abs() < 1e-6);
         // A field v = i (index x) grows by 1 per 0.5 world units along the first axis.
         let g = grid.gradient_to_world(Vec3::X);
         assert!((g.length() - 2.0).abs() < 1e-5 && (f64::from(g.x) - 2.0 * c).abs() < 1e-5, "{g}");
+    }
+
+    #[test]
+    fn a_grid_far_from_the_origin_keeps_its_precision() {
+        let far = [8e7, 4.5e6, -1e9];
+        let near = Grid::new([4, 5, 6], [0.25; 3], IDENTITY, [0.0; 3], Space::Plain).unwrap();
+        let grid = Grid::new([4, 5, 6], [0.25; 3], IDENTITY, far, Space::Plain).unwrap();
+        let p = Vec3::new(0.3, 4.0, 2.5);
+        assert_eq!(grid.index_to_world(p), near.index_to_world(p));
+        assert_eq!(grid.to_world([far[0] + 0.25, far[1], far[2] - 0.5]), near.to_world([0.25, 0.0, -0.5]));
+        assert_eq!(grid.file_bounds(), [far.map(|x| x - 0.125), [8e7 + 0.875, 4.5e6 + 1.125, -1e9 + 1.375]]);
     }
 
     #[test]

@@ -30,8 +30,8 @@ pub fn grids() -> [(&'static str, Grid); 3] {
 /// A sphere inside the box of every grid.
 pub const PROBE: (Vec3, f32) = (Vec3::new(0.3, 0.2, -0.1), 0.35);
 
-/// Centre of the grids.
-const MIDDLE: Vec3 = Vec3::splat(0.1);
+/// Middle of the grids, wherever their files place them: the origin of the renderer's world.
+const MIDDLE: Vec3 = Vec3::ZERO;
 
 /// Area vectors of the three pairs of faces.
 fn normals(grid: &Grid) -> [Vec3; 3] {

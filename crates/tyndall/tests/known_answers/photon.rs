@@ -196,7 +196,11 @@ fn lights_of_every_kind() {
         ("map", sky(Environment::map(map, Vec3::Z, 30.0, true))),
     ];
     for (name, light) in lights {
-        assert_as_path(name, &seen(Setup { lights: vec![light], ..sunny(0.7) }, ASIDE, Vec3::ZERO, 1.6));
+        let scene = seen(Setup { lights: vec![light], ..sunny(0.7) }, ASIDE, Vec3::ZERO, 1.6);
+        // Paths that end beside a point light are rare and bright: eight seeds do not tell how noisy few of them are.
+        let samples = if name == "point inside" { 16 * SAMPLES } else { SAMPLES };
+        let paths = estimate(&scene, &PathTracer::usual(), samples);
+        photons(&scene, PHOTONS).assert_near(&paths, BIAS, name);
     }
 }
 
@@ -303,7 +307,7 @@ fn a_camera_inside() {
     scene.camera = Camera::new(Vec3::new(0.2, -0.6, 0.0), Vec3::new(0.0, 1.0, 0.2), Vec3::Z, lens);
     scene.background = Background::Color(Rgb::new(0.02, 0.0, 0.05));
     // Near the camera all rays pass the same few photons.
-    let many = PhotonSettings { photons: 400_000, radius: 1.5, ..PHOTONS };
+    let many = PhotonSettings { photons: 600_000, radius: 1.5, ..PHOTONS };
     assert_as_path_with(many, "inside", &scene);
 }
 

@@ -195,7 +195,8 @@ fn positions_and_directions_must_make_sense() {
     refused(&view([0.0, 5.0, 0.0], origin, up), "camera.up");
     refused(&view([0.0, -5.0, 1e-6], origin, up), "camera.up");
     refused(&view([0.0, 0.0, 1.0], origin, origin), "camera.up");
-    refused(&view([0.0, 0.0, 3e38], [0.0, 0.0, -3e38], up), "camera.target");
+    refused(&view([0.0, 0.0, 9e37], [0.0, 0.0, -9e37], up), "camera.target");
+    refused(&view([0.0, 0.0, 2e38], origin, up), "camera.position.2");
     refused(&json!({ "camera": { "auto": {}, "up": [0, 0, 0] } }), "camera.up");
 
     let light = |light: Value| json!({ "lights": [light] });

@@ -19,8 +19,8 @@ use crate::scene::Scene;
 use crate::simd::Level;
 use chunk::Update;
 use rayon::prelude::*;
+use siphasher::sip::SipHasher13;
 use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tracer::{EmissionSource, Tracer};
 
@@ -108,11 +108,7 @@ pub(crate) fn sources(scene: &Scene) -> Vec<PathSource> {
         }
     }
     let stream = |i: usize| match &scene.light_names[i] {
-        Some(name) if first_of[name.as_str()] == i => {
-            let mut hasher = DefaultHasher::new();
-            name.hash(&mut hasher);
-            Emitter::Named { hash: cast::low_u32(hasher.finish()) }.number()
-        }
+        Some(name) if first_of[name.as_str()] == i => Emitter::Named { hash: hash_of(name) }.number(),
         _ => Emitter::Unnamed { index: cast::fit_u32(i) }.number(),
     };
     let of_light = |(i, light): (usize, &Light)| PathSource { light: Some(light.clone()), stream: stream(i) };
@@ -121,6 +117,11 @@ pub(crate) fn sources(scene: &Scene) -> Vec<PathSource> {
     let mut sources: Vec<_> = lights.iter().enumerate().map(of_light).chain(matter).collect();
     sources.sort_by_key(|source| source.stream);
     sources
+}
+
+/// Tells a light's name from others. The standard library's hasher may change with the compiler, and every picture with it.
+fn hash_of(name: &str) -> u32 {
+    cast::low_u32(SipHasher13::new().hash(name.as_bytes()))
 }
 
 impl<V: Vertex> LightPaths<V> {
@@ -221,4 +222,15 @@ fn morton(u: [f32; 4]) -> u32 {
         of(0) | of(1) | of(2) | of(3)
     };
     (0..8).rev().fold(0, |key, i| key << 4 | bit(i))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By `PYTHONHASHSEED=0 python3 -c "print(hex(hash(b'bulb') & 0xffffffff))"`, which is SipHash-1-3 with a key of zeros.
+    #[test]
+    fn the_random_numbers_of_a_named_light_never_change() {
+        assert_eq!([hash_of("bulb"), hash_of("key light")], [0x7bcb8394, 0xef14a71]);
+    }
 }

@@ -15,7 +15,7 @@ pub use settings::Settings;
 use super::{
     Edited, ItemChanges, KeptCount, KeptItems, Method, MethodReport, MovedKey, PixelCounts, Resources, Stop,
 };
-use crate::film::{PixelSample, Tile};
+use crate::film::{Goal, PixelSample, Tile};
 use crate::math::Ray;
 use crate::sampling::PathSampler;
 use crate::scene::{Difference, Scene};
@@ -78,7 +78,7 @@ impl Method for PathTracer {
         let Some(query) = self.keeper.as_mut().and_then(|keeper| keeper.update(edit)) else { return false };
         tiles.par_iter_mut().for_each(|tile| {
             tile.pending = None;
-            tile.samples.ask(&query);
+            tile.samples.ask(query);
         });
         true
     }
@@ -87,17 +87,9 @@ impl Method for PathTracer {
         tiles.iter_mut().for_each(|tile| tile.samples.counts = SampleCounts::default());
     }
 
-    fn refine(&self, scene: &Scene, tile: &mut Tile, state: &mut TileState, samples: u32, stop: &Stop) {
+    fn refine(&self, scene: &Scene, tile: &mut Tile, state: &mut TileState, goal: Goal, stop: &Stop) {
         let TileState { pending, samples: kept } = state;
-        self.level.run(TracePixels {
-            scene,
-            tile,
-            pending,
-            kept,
-            keeper: self.keeper.as_ref(),
-            samples,
-            stop,
-        });
+        self.level.run(TracePixels { scene, tile, pending, kept, keeper: self.keeper.as_ref(), goal, stop });
     }
 
     fn report(&self, tiles: &[TileState], pixels: &PixelCounts) -> MethodReport {

@@ -74,11 +74,18 @@ pub(super) struct SampleQuery {
     behind: bool,
 }
 
+impl SampleQuery {
+    /// Asks for what either asks for.
+    fn with(mut self, other: Self) -> Self {
+        self.past.add(&other.past);
+        Self { past: self.past, behind: self.behind || other.behind }
+    }
+}
+
 /// The result of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 struct KeptSample {
-    /// The first component is NaN if the sample must be retaken.
     radiance: [f32; 3],
     /// NaN if no matter was met.
     depth: f32,
@@ -90,8 +97,23 @@ pub struct SampleTile {
     samples: Vec<KeptSample>,
     flight: PackedHistories,
     scatter: PackedHistories,
+    /// Queries that samples have yet to answer, by increasing `end`; a sample answers the first one that includes it.
+    pending: Vec<PendingQuery>,
+    /// Number of samples that were looked up since the last query.
+    looked_up: usize,
     pub(super) counts: SampleCounts,
 }
+
+/// A query to samples that have not been looked up since.
+#[derive(Clone, Copy, Debug)]
+struct PendingQuery {
+    /// One more than the index of the last sample that it includes.
+    end: usize,
+    query: SampleQuery,
+}
+
+/// Maximum number of pending queries; with more, two are merged, and a few samples are retaken in vain.
+const MOST_PENDING: usize = 16;
 
 /// Counts of a tile's samples since the last edit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -109,6 +131,8 @@ impl Default for SampleTile {
             samples: Vec::new(),
             flight: histories.clone(),
             scatter: histories,
+            pending: Vec::new(),
+            looked_up: 0,
             counts: SampleCounts::default(),
         }
     }
@@ -129,11 +153,15 @@ impl SampleTile {
     #[inline]
     pub fn get(&mut self, i: usize) -> Option<PixelSample> {
         let KeptSample { radiance, depth } = *self.samples.get(i)?;
-        if radiance[0].is_nan() {
-            return None;
+        let met = !depth.is_nan();
+        if let Some(PendingQuery { query, .. }) = self.pending.iter().find(|pending| i < pending.end) {
+            let past = Past { flight: self.flight.get(i), scatter: self.scatter.get(i) };
+            if past.meets(&query.past) || (query.behind && !met) {
+                return None;
+            }
         }
         self.counts.found += 1;
-        let met = !depth.is_nan();
+        self.looked_up = i + 1;
         Some(PixelSample {
             radiance: Rgb::from(radiance),
             alpha: f32::from(u8::from(met)),
@@ -159,6 +187,7 @@ impl SampleTile {
             self.scatter.set(i, past.scatter);
         }
         self.counts.taken += 1;
+        self.looked_up = i + 1;
     }
 
     fn reserve(&mut self, more: usize) {
@@ -167,15 +196,23 @@ impl SampleTile {
         self.scatter.reserve(more);
     }
 
-    /// Invalidates the samples that an edit touched.
-    pub(super) fn ask(&mut self, query: &SampleQuery) {
-        let SampleQuery { past: asked, behind } = query;
-        for (i, sample) in self.samples.iter_mut().enumerate() {
-            let past = Past { flight: self.flight.get(i), scatter: self.scatter.get(i) };
-            if past.meets(asked) || (*behind && sample.depth.is_nan()) {
-                sample.radiance[0] = f32::NAN;
-            }
+    /// Invalidates the samples that an edit touched. They answer the query when they are looked up, so that an edit costs no time for
+    /// samples that the next one may touch too.
+    pub(super) fn ask(&mut self, query: SampleQuery) {
+        let looked_up = PendingQuery { end: self.looked_up, query };
+        let others = self.pending.iter().filter(|pending| pending.end > self.looked_up);
+        let others = others.map(|pending| PendingQuery { query: pending.query.with(query), ..*pending });
+        let mut pending: Vec<_> = std::iter::once(looked_up).chain(others).collect();
+        if pending.last().is_some_and(|last| last.end < self.len()) {
+            pending.push(PendingQuery { end: self.len(), query });
         }
+        pending.retain(|pending| pending.end > 0);
+        if pending.len() > MOST_PENDING {
+            let last = pending.remove(MOST_PENDING);
+            let before = &mut pending[MOST_PENDING - 1];
+            *before = PendingQuery { end: last.end, query: before.query.with(last.query) };
+        }
+        (self.pending, self.looked_up) = (pending, 0);
         self.counts = SampleCounts::default();
     }
 
@@ -184,5 +221,60 @@ impl SampleTile {
         let pairs = self.samples.iter().zip(&other.samples);
         let differing = pairs.filter(|(a, b)| bytemuck::bytes_of(*a) != bytemuck::bytes_of(*b)).count();
         ItemChanges { differing, new: self.len().saturating_sub(other.len()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sampling::Stream;
+    use crate::transfer::Historygram;
+
+    /// Queries that wait until a sample is looked up invalidate what queries at once would, however far the samples were looked up
+    /// between them; merging many may only invalidate more.
+    #[test]
+    fn pending_queries_invalidate_what_immediate_ones_would() {
+        const SAMPLES: usize = 40;
+        let mut stream = Stream::new(3, [0; 3]);
+        let (mut found, mut retaken) = (0, 0);
+        for edits in [3, 8, 40] {
+            let mut tile = SampleTile::default();
+            // What each sample depends on, and whether an edit has touched it since it was taken.
+            let mut model: Vec<(Past, bool)> = Vec::new();
+            for _ in 0..edits {
+                let reach = (stream.uniform() * (SAMPLES + 1) as f32) as usize;
+                for i in 0..reach.min(model.len() + 5) {
+                    let group = |stream: &mut Stream| Historygram::from_bits(1 << (stream.bits() % 20));
+                    if let Some(sample) = tile.get(i) {
+                        assert!(!model[i].1, "sample {i} is out of date");
+                        assert_eq!(sample.radiance.r, i as f32);
+                        found += 1;
+                    } else {
+                        assert!(
+                            edits > MOST_PENDING || i >= model.len() || model[i].1,
+                            "sample {i} is up to date"
+                        );
+                        let past = Past { flight: group(&mut stream), scatter: group(&mut stream) };
+                        let radiance = Rgb::splat(i as f32);
+                        tile.put(i, &PixelSample { radiance, ..PixelSample::default() }, &past, SAMPLES);
+                        if i < model.len() {
+                            model[i] = (past, false)
+                        } else {
+                            model.push((past, false))
+                        }
+                        retaken += 1;
+                    }
+                }
+                let bits = |stream: &mut Stream| {
+                    Historygram::from_bits(u128::from(stream.bits() & stream.bits() & 0xfffff))
+                };
+                let past = Past { flight: bits(&mut stream), scatter: Historygram::EMPTY };
+                for (sample, touched) in &mut model {
+                    *touched |= sample.meets(&past);
+                }
+                tile.ask(SampleQuery { past, behind: false });
+            }
+        }
+        assert!(found > 100 && retaken > 100, "{found} found, {retaken} retaken");
     }
 }

@@ -1,7 +1,7 @@
 //! A camera path: it flies from collision to collision and samples light at each.
 
 use super::samples::{SampleKeeper, SampleTile};
-use crate::film::{PixelSample, Tile};
+use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::Stop;
 use crate::integrator::history::{Past, Writer};
 use crate::integrator::next_event::ScatteringPoint;
@@ -16,7 +16,7 @@ use std::ops::ControlFlow;
 /// Compared with 1/4, this reaches the same error in 0.75 (coloured cloud) to 1.02 (white cloud) of the time.
 const ROULETTE_WEIGHT: f32 = 1.0;
 
-/// Adds paths to the pixels of a tile until each has the target number of samples, unless stopped first.
+/// Adds paths to the pixels of a tile until it reaches the goal, unless stopped first.
 pub(super) struct TracePixels<'a> {
     pub scene: &'a Scene,
     pub tile: &'a mut Tile,
@@ -25,7 +25,7 @@ pub(super) struct TracePixels<'a> {
     pub kept: &'a mut SampleTile,
     /// `None` if no samples are kept.
     pub keeper: Option<&'a SampleKeeper>,
-    pub samples: u32,
+    pub goal: Goal,
     pub stop: &'a Stop<'a>,
 }
 
@@ -34,16 +34,15 @@ impl Kernel for TracePixels<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { scene, tile, pending, kept, keeper, samples, stop } = self;
-        while tile.samples() < samples {
+        let Self { scene, tile, pending, kept, keeper, goal, stop } = self;
+        while !tile.has_reached(goal) {
             let number = tile.taken();
             if let Some(sample) = kept.get(number) {
                 tile.add(&sample);
                 continue;
             }
-            let (mut pixels, sample) = tile.next(1);
-            let Some(pixel) = pixels.next() else { return };
-            drop(pixels);
+            let Some(pixel) = tile.next(goal, 1).next() else { return };
+            let sample = tile.samples();
             let mut path = pending.take().unwrap_or_else(|| CameraPath::of_pixel(scene, pixel, sample));
             let keeper = keeper.filter(|keeper| keeper.wants(kept, tile));
             let ended = if let Some(keeper) = keeper {

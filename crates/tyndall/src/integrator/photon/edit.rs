@@ -36,7 +36,7 @@ impl PhotonMapper {
         }
         self.update_lights(new, touched.glow);
         if difference.density.is_some() {
-            self.map = None;
+            self.map.discard();
         }
         if difference.camera || difference.size || steps {
             self.has_segments = false;
@@ -72,27 +72,27 @@ impl PhotonMapper {
                 Some(mut kept) => {
                     if kept.light.as_ref().map(Light::color) != light.as_ref().map(Light::color) {
                         self.mark(&kept);
-                        self.map = None;
+                        self.map.discard();
                     }
                     kept.light = light;
                     kept
                 }
                 None => {
-                    self.map = None;
+                    self.map.discard();
                     LightPaths::new(PathSource { light, stream }, &plan)
                 }
             };
             if paths.count != plan.count {
                 // Every photon of this light now carries more or less flux.
                 self.mark(&paths);
-                self.map = None;
+                self.map.discard();
                 paths.set_count(&plan);
             }
             self.lights.push(paths);
         }
         for gone in old.into_iter().flatten() {
             self.mark(&gone);
-            self.map = None;
+            self.map.discard();
         }
     }
 

@@ -1,8 +1,8 @@
 //! The regions over which a gather collects photons; lengths in units of the map's radius.
 
 use crate::math::{Frame, Mat3, Vec3};
-use crate::medium::MOST_LANES;
 use crate::simd::Lanes;
+use crate::simd::MOST_LANES;
 use fearless_simd::prelude::*;
 use std::f32::consts::PI;
 

@@ -3,7 +3,8 @@
 use super::kernel::Points;
 use super::settings::Estimator;
 use super::stored::Photon;
-use crate::integrator::cells::{CellGrid, CellStarts, KEY_BYTES, Positioned, SortedItems};
+use crate::integrator::Limits;
+use crate::integrator::cells::{CellGrid, CellSort, CellStarts, KEY_BYTES, Positioned, SortedItems};
 use crate::integrator::light_paths::Chunk;
 use crate::math::{DVec3, Vec3, cast};
 use crate::medium::Medium;
@@ -32,56 +33,186 @@ pub(super) struct PhotonMap {
     pub(super) per_opacity: Vec<f32>,
 }
 
+/// Bytes of a photon in the map, and of its sorting keys.
+pub(super) const BYTES: u64 = 32 + KEY_BYTES;
+
+/// Photons that are written into the map at once: some tenths of a millisecond's work.
+const PIECE: usize = 1 << 12;
+
 /// Chunks of one light, with the factor for their photons' flux.
 pub(super) struct Lit<'a> {
     pub chunks: &'a [Chunk<Photon>],
     pub scale: DVec3,
 }
 
-/// Bytes of a photon in the map, and of its sorting key.
-pub(super) const BYTES: u64 = 32 + KEY_BYTES;
+/// Parameters of a map.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MapSettings {
+    pub grid: CellGrid,
+    /// World units.
+    pub radius: f32,
+    pub estimate: Estimator,
+}
 
-impl PhotonMap {
-    /// Sorts the photons of all lights; `radius` in world units.
-    pub fn new(medium: &Medium, grid: CellGrid, radius: f32, estimate: Estimator, lights: &[Lit]) -> Self {
+/// A map being built, piece by piece, so that a stop takes effect soon and the work can be resumed.
+#[derive(Debug)]
+pub(super) struct MapInProgress {
+    sort: CellSort,
+    /// `None` until the photons are sorted.
+    filling: Option<Filling>,
+}
+
+/// Sorted photons, and the map into which some pieces of them have been written.
+#[derive(Debug)]
+struct Filling {
+    sorted: SortedItems,
+    map: PhotonMap,
+    filled: Vec<bool>,
+}
+
+/// The states of a map.
+#[derive(Debug, Default)]
+pub(super) enum MapState {
+    /// It was never built, or photons have changed since.
+    #[default]
+    Absent,
+    InProgress(MapInProgress),
+    Ready(PhotonMap),
+}
+
+impl MapState {
+    pub fn ready(&self) -> Option<&PhotonMap> {
+        match self {
+            Self::Ready(map) => Some(map),
+            Self::Absent | Self::InProgress(_) => None,
+        }
+    }
+
+    /// Discards the map, because photons change.
+    pub fn discard(&mut self) {
+        *self = Self::Absent;
+    }
+
+    /// Builds the map, or continues to; false if stopped first. See [`MapInProgress::go_on`].
+    pub fn build(
+        &mut self,
+        medium: &Medium,
+        settings: &MapSettings,
+        lights: &[Lit],
+        limits: &Limits,
+    ) -> bool {
+        if let Self::Absent = self {
+            *self = Self::InProgress(MapInProgress::new(settings, lights));
+        }
+        if let Self::InProgress(map) = self
+            && let Some(map) = map.go_on(medium, settings, lights, limits)
+        {
+            *self = Self::Ready(map);
+        }
+        self.ready().is_some()
+    }
+}
+
+impl MapInProgress {
+    /// Starts a map of the photons of all lights, which must not change until it is complete.
+    pub fn new(settings: &MapSettings, lights: &[Lit]) -> Self {
+        let lengths = lights.iter().flat_map(|lit| lit.chunks).map(|chunk| chunk.vertices().len());
+        Self { sort: CellSort::new(&settings.grid, lengths), filling: None }
+    }
+
+    /// Continues, in parallel on the current pool; `None` if stopped first. Photons and settings must be the same in every call.
+    pub fn go_on(
+        &mut self,
+        medium: &Medium,
+        settings: &MapSettings,
+        lights: &[Lit],
+        limits: &Limits,
+    ) -> Option<PhotonMap> {
         let chunks: Vec<(&[Photon], DVec3)> = lights
             .iter()
             .flat_map(|lit| lit.chunks.iter().map(|chunk| (chunk.vertices(), lit.scale)))
             .collect();
-        let lists: Vec<&[Photon]> = chunks.iter().map(|chunk| chunk.0).collect();
-        let sorted = SortedItems::new(&grid, &lists);
-        let room = sorted.len() + crate::medium::MOST_LANES;
-        let mut map = Self {
+        if self.filling.is_none() {
+            let lists: Vec<&[Photon]> = chunks.iter().map(|chunk| chunk.0).collect();
+            self.filling = self.sort.go_on(&settings.grid, &lists, limits).map(|sorted| {
+                let map = PhotonMap::with_room(settings, &sorted);
+                let filled = vec![false; sorted.len().div_ceil(PIECE)];
+                Filling { sorted, map, filled }
+            });
+        }
+        let Filling { sorted, map, filled } = self.filling.as_mut()?;
+        map.fill(medium, sorted, &chunks, filled, limits);
+        if filled.iter().all(|&filled| filled) { self.filling.take().map(|done| done.map) } else { None }
+    }
+}
+
+impl PhotonMap {
+    /// A map with room for the sorted photons, and for a whole vector after the last.
+    fn with_room(&MapSettings { grid, radius, estimate }: &MapSettings, sorted: &SortedItems) -> Self {
+        let room = sorted.len() + crate::simd::MOST_LANES;
+        let zeros = || vec![0.0; room];
+        Self {
             radius,
             points: Points::new(),
             estimate,
             grid,
             starts: sorted.starts.clone(),
-            x: vec![0.0; room],
-            y: vec![0.0; room],
-            z: vec![0.0; room],
+            x: zeros(),
+            y: zeros(),
+            z: zeros(),
             directions: vec![0; room],
-            red: vec![0.0; room],
-            green: vec![0.0; room],
-            blue: vec![0.0; room],
-            per_opacity: vec![0.0; room],
-        };
-        let positions = (&mut map.x, &mut map.y, &mut map.z, &mut map.directions);
-        let weights = (&mut map.red, &mut map.green, &mut map.blue, &mut map.per_opacity);
-        let ((x, y, z, directions), (red, green, blue, per_opacity)) = (positions, weights);
-        (sorted.addresses(), x, y, z, directions, red, green, blue, per_opacity).into_par_iter().for_each(
-            |(address, x, y, z, direction, red, green, blue, per_opacity)| {
-                let (photons, scale) = chunks[address.list];
-                let photon = photons[address.index];
-                [*x, *y, *z] = grid.to_metric(photon.position()).to_array();
-                *direction = photon.direction.word();
-                let value = medium.volume().value(photon.position());
-                *per_opacity = medium.transfer().opacity(value).recip();
-                let flux = Vec3::from_array(photon.flux).as_dvec3() * scale;
-                [*red, *green, *blue] = flux.to_array().map(cast::single);
-            },
+            red: zeros(),
+            green: zeros(),
+            blue: zeros(),
+            per_opacity: zeros(),
+        }
+    }
+
+    /// Writes the pieces of the sorted photons that are not `filled` yet.
+    fn fill(
+        &mut self,
+        medium: &Medium,
+        sorted: &SortedItems,
+        chunks: &[(&[Photon], DVec3)],
+        filled: &mut [bool],
+        limits: &Limits,
+    ) {
+        let grid = self.grid;
+        let positions = (
+            self.x.par_chunks_mut(PIECE),
+            self.y.par_chunks_mut(PIECE),
+            self.z.par_chunks_mut(PIECE),
+            self.directions.par_chunks_mut(PIECE),
         );
-        map
+        let weights = (
+            self.red.par_chunks_mut(PIECE),
+            self.green.par_chunks_mut(PIECE),
+            self.blue.par_chunks_mut(PIECE),
+            self.per_opacity.par_chunks_mut(PIECE),
+        );
+        let ((xs, ys, zs, directions), (reds, greens, blues, per_opacities)) = (positions, weights);
+        (filled, xs, ys, zs, directions, reds, greens, blues, per_opacities)
+            .into_par_iter()
+            .enumerate()
+            .with_max_len(1)
+            .for_each(|(piece, (filled, x, y, z, direction, red, green, blue, per_opacity))| {
+                if *filled || limits.stop().reached() {
+                    return;
+                }
+                let first = piece * PIECE;
+                for i in 0..PIECE.min(sorted.len() - first) {
+                    let address = sorted.address(first + i);
+                    let (photons, scale) = chunks[address.list];
+                    let photon = photons[address.index];
+                    [x[i], y[i], z[i]] = grid.to_metric(photon.position()).to_array();
+                    direction[i] = photon.direction.word();
+                    let value = medium.volume().value(photon.position());
+                    per_opacity[i] = medium.transfer().opacity(value).recip();
+                    let flux = Vec3::from_array(photon.flux).as_dvec3() * scale;
+                    [red[i], green[i], blue[i]] = flux.to_array().map(cast::single);
+                }
+                *filled = true;
+            });
     }
 
     /// Size in bytes.

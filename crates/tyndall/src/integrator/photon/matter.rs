@@ -12,8 +12,8 @@
 
 use super::kernel::GatherRegion;
 use crate::math::{Mat3, Vec3};
-use crate::medium::{MOST_LANES, MarchNotes, Medium};
-use crate::simd::Lanes;
+use crate::medium::{MarchNotes, Medium};
+use crate::simd::{Lanes, MOST_LANES};
 use fearless_simd::prelude::*;
 
 /// Maximum share of the flux that the slope may remove: at a flat surface it removes 0.7. Removing more would leave

@@ -29,12 +29,12 @@ use super::{
     Edited, ItemChanges, KeptCount, KeptItems, Limits, MemoryNeed, Method, MethodReport, NamedCount,
     PixelCounts, Resources, SettingProblem, StageNames, Stop, WorkShare,
 };
-use crate::film::Tile;
+use crate::film::{Goal, Tile};
 use crate::light::Enclosure;
 use crate::math::DVec3;
 use crate::scene::{Difference, Scene};
 use kernel::Slice;
-use map::{Lit, PhotonMap};
+use map::{Lit, MapSettings, MapState, PhotonMap};
 use pass::Pass;
 use segments::{GatherSegments, SegmentCounts, SegmentTile};
 use settings::Estimator;
@@ -48,8 +48,8 @@ pub struct PhotonMapper {
     settings: Settings,
     ground: Ground,
     lights: Vec<LightPaths<Photon>>,
-    /// The base map; `None` if photons have changed since it was built.
-    map: Option<PhotonMap>,
+    /// The base map.
+    map: MapState,
     /// Where photons have changed since segments were last invalidated.
     marks: ChangeMarks,
     /// Whether there may be segments that an edit can leave valid.
@@ -87,7 +87,7 @@ impl PhotonMapper {
         let chunks = || self.lights.iter().flat_map(|light| &light.chunks);
         let bytes = |of: fn(ChunkBytes) -> usize| chunks().map(|chunk| of(chunk.bytes())).sum();
         let count = self.photons();
-        let map = self.map.as_ref().map_or(0, PhotonMap::bytes);
+        let map = self.map.ready().map_or(0, PhotonMap::bytes);
         [
             KeptCount { name: "paths", count: self.paths(), bytes: bytes(|chunk| chunk.paths) },
             KeptCount { name: "photons", count, bytes: bytes(|chunk| chunk.vertices) },
@@ -159,7 +159,7 @@ impl Method for PhotonMapper {
             settings: *settings,
             ground: Ground { reading, enclosure, level: resources.level },
             lights,
-            map: None,
+            map: MapState::Absent,
             marks: marks_for(scene, settings),
             has_segments: false,
             pass: None,
@@ -199,13 +199,11 @@ impl Method for PhotonMapper {
         let done = tracing.trace(&mut self.lights);
         self.traced += done.traced;
         if done.traced > 0 {
-            self.map = None;
+            self.map.discard();
         }
-        if !done.finished {
+        let radius = self.settings.radius;
+        if !done.finished || !build_map(&mut self.map, scene, radius, &self.settings, &self.lights, limits) {
             return false;
-        }
-        if self.map.is_none() {
-            self.map = Some(sorted(scene, self.settings.radius, &self.settings, &self.lights));
         }
         self.has_segments = true;
         true
@@ -215,33 +213,28 @@ impl Method for PhotonMapper {
         1
     }
 
-    /// Takes the next sample of every pixel of a tile, unless stopped first.
     fn refine(
         &self,
         scene: &Scene,
         tile: &mut Tile,
         segments: &mut Option<SegmentTile>,
-        samples: u32,
+        goal: Goal,
         stop: &Stop,
     ) {
-        if tile.samples() >= samples {
-            return;
-        }
         let (step, gather_spacing) = (step(scene, &self.settings), self.settings.gather_spacing);
         if tile.samples() > 0 {
-            let map = self.pass.as_ref().and_then(|pass| pass.map.as_ref());
+            let map = self.pass.as_ref().and_then(|pass| pass.map.ready());
             let view = View { scene, map, step, gather_spacing };
-            self.ground.level.run(pass::GatherPass { view, tile, stop });
+            self.ground.level.run(pass::GatherPass { view, tile, goal, stop });
             return;
         }
         let Ground { reading: Reading { groups, cells, .. }, level, .. } = &self.ground;
         let per_ray = self.settings.segments as usize;
-        let segments = segments.get_or_insert_with(|| {
-            let pixels = tile.next(usize::MAX).0.len();
-            SegmentTile::new(pixels, per_ray, groups.count())
-        });
-        let view = View { scene, map: self.map.as_ref(), step, gather_spacing };
-        level.run(GatherSegments { view, segments, tile, groups, cells, positions: &self.marks, stop });
+        let segments =
+            segments.get_or_insert_with(|| SegmentTile::new(tile.pixel_count(), per_ray, groups.count()));
+        let view = View { scene, map: self.map.ready(), step, gather_spacing };
+        let positions = &self.marks;
+        level.run(GatherSegments { view, segments, tile, goal, groups, cells, positions, stop });
     }
 
     fn report(&self, tiles: &[Option<SegmentTile>], _: &PixelCounts) -> MethodReport {
@@ -356,18 +349,28 @@ impl KeptItems for KeptLight {
     }
 }
 
-/// Sorts the photons of all lights; `radius` in voxels.
-fn sorted(scene: &Scene, radius: f32, settings: &Settings, lights: &[LightPaths<Photon>]) -> PhotonMap {
-    let grid = scene.medium.volume().grid();
-    let cells = cells_for(scene, settings, radius);
-    let radius = radius * grid.voxel_size();
+/// Sorts the photons of all lights into a map, unless it is ready; `radius` in voxels. False if stopped first.
+fn build_map(
+    map: &mut MapState,
+    scene: &Scene,
+    radius: f32,
+    settings: &Settings,
+    lights: &[LightPaths<Photon>],
+    limits: &Limits,
+) -> bool {
+    if map.ready().is_some() {
+        return true;
+    }
+    let voxel = scene.medium.volume().grid().voxel_size();
+    let grid = cells_for(scene, settings, radius);
+    let settings = MapSettings { grid, radius: radius * voxel, estimate: settings.estimator() };
     // In double precision, since world units may have any scale.
-    let per_volume = f64::from(radius).powi(3).recip() / f64::from(scene.medium.density());
+    let per_volume = f64::from(settings.radius).powi(3).recip() / f64::from(scene.medium.density());
     let scale = |light: &LightPaths<Photon>| {
         let [r, g, b] = light.color().to_array().map(f64::from);
         DVec3::new(r, g, b) * (per_volume / f64::from(light.count))
     };
     let lit: Vec<Lit> =
         lights.iter().map(|light| Lit { chunks: &light.chunks, scale: scale(light) }).collect();
-    PhotonMap::new(&scene.medium, cells, radius, settings.estimator(), &lit)
+    map.build(&scene.medium, &settings, &lit, limits)
 }

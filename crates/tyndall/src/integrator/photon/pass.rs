@@ -1,11 +1,11 @@
 //! Refinement passes: each has its own photons and rays, so that the picture converges \[Knaus11\].
 
-use super::map::PhotonMap;
+use super::map::MapState;
 use super::settings::Settings;
 use super::stored::Photon;
 use super::view::{Stretches, View};
-use super::{plan, sorted};
-use crate::film::{PixelSample, Tile};
+use super::{build_map, plan};
+use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::cells::ChangeMarks;
 use crate::integrator::light_paths::{Ground, HistoryDetail, LightPaths, Plan, Tracing, sources};
 use crate::integrator::{Limits, Stop};
@@ -21,7 +21,7 @@ pub(super) struct Pass {
     /// In voxels.
     radius: f32,
     lights: Vec<LightPaths<Photon>>,
-    pub map: Option<PhotonMap>,
+    pub map: MapState,
 }
 
 /// Trade-off between variance and bias of successive passes, between 0 and 1: the value that \[Knaus11\] found best.
@@ -40,29 +40,37 @@ impl Pass {
         let plan =
             Plan { histories: HistoryDetail::Paths, pass: number, ..plan(scene, settings, sources.len()) };
         let lights = sources.into_iter().map(|source| LightPaths::new(source, &plan)).collect();
-        Self { number, settings: *settings, radius: settings.radius * shrunk(number), lights, map: None }
+        Self {
+            number,
+            settings: *settings,
+            radius: settings.radius * shrunk(number),
+            lights,
+            map: MapState::Absent,
+        }
     }
 
     /// Traces and sorts the photons; false if stopped first.
     pub fn prepare(&mut self, scene: &Scene, ground: &Ground, limits: &Limits) -> bool {
-        if self.map.is_some() {
+        if self.map.ready().is_some() {
             return true;
         }
         let marks = ChangeMarks::off();
         let tracing = Tracing { scene, ground, pass: self.number, marks: &marks, limits };
-        let whole = tracing.trace(&mut self.lights).finished;
-        if whole {
-            self.map = Some(sorted(scene, self.radius, &self.settings, &self.lights));
+        let built = tracing.trace(&mut self.lights).finished
+            && build_map(&mut self.map, scene, self.radius, &self.settings, &self.lights, limits);
+        if built {
             self.lights = Vec::new();
         }
-        whole
+        built
     }
 }
 
-/// Takes a sample of every pixel of a tile, along jittered rays with jittered steps, unless stopped first.
+/// Takes samples of the pixels of a tile until it reaches the goal, along jittered rays with jittered steps, unless stopped
+/// first.
 pub(super) struct GatherPass<'a> {
     pub view: View<'a>,
     pub tile: &'a mut Tile,
+    pub goal: Goal,
     pub stop: &'a Stop<'a>,
 }
 
@@ -71,11 +79,11 @@ impl Kernel for GatherPass<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { view, tile, stop } = self;
-        let (scene, target) = (view.scene, tile.samples() + 1);
-        while tile.samples() < target {
+        let Self { view, tile, goal, stop } = self;
+        let scene = view.scene;
+        while !tile.has_reached(goal) {
             let mut stretches = Stretches::default();
-            let (pixels, sample) = tile.next(S::WIDTH);
+            let (pixels, sample) = (tile.next(goal, S::WIDTH), tile.samples());
             let count = pixels.len();
             for (lane, [x, y]) in pixels.enumerate() {
                 let pixel = y * scene.size[0] + x;
@@ -99,7 +107,7 @@ impl Kernel for GatherPass<'_> {
                     depth: distance * ray.direction.dot(scene.camera.view()),
                 });
             }
-            if stop.reached() {
+            if stop.reached_now() {
                 return;
             }
         }

@@ -1,15 +1,15 @@
 //! View rays divided into segments, each computed, kept and invalidated independently \[Jonsson12, sec. 4.3.2\].
 
 use super::view::{Notes, Stretch, Stretches, View};
-use crate::film::{PixelSample, Tile};
+use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::cells::ChangeMarks;
 use crate::integrator::history::PackedHistories;
 use crate::integrator::view_march::OPAQUE;
 use crate::integrator::{ItemChanges, Stop};
 use crate::math::{Ray, Rgb, cast};
-use crate::medium::{MOST_LANES, Track};
+use crate::medium::Track;
 use crate::scene::Scene;
-use crate::simd::{Kernel, Lanes};
+use crate::simd::{Kernel, Lanes, MOST_LANES};
 use crate::transfer::{HistoryGroups, Historygram};
 use bytemuck::{Pod, Zeroable};
 
@@ -137,7 +137,7 @@ impl SegmentTile {
     }
 
     /// Invalidates the segments that the recorded changes touch.
-    fn invalidate(&mut self, view: &View, pixels: &[[u32; 2]], positions: &ChangeMarks) {
+    fn invalidate(&mut self, view: &View, tile: &Tile, positions: &ChangeMarks) {
         let Some(changed) = self.changed.take() else { return };
         if !changed.is_empty() {
             for i in 0..self.len() {
@@ -149,9 +149,10 @@ impl SegmentTile {
         if positions.everywhere() {
             self.segments.fill(Segment::UNKNOWN);
         } else if positions.any() {
-            for (ray, segments) in self.segments.chunks_exact_mut(self.per_ray).enumerate() {
+            let pixels = tile.positions(0..tile.pixel_count());
+            for (pixel, segments) in pixels.zip(self.segments.chunks_exact_mut(self.per_ray)) {
                 if segments.iter().any(Segment::is_known) {
-                    forget_near(view, pixels[ray], positions, segments);
+                    forget_near(view, pixel, positions, segments);
                 }
             }
         }
@@ -255,11 +256,13 @@ fn forget_near(view: &View, pixel: [u32; 2], positions: &ChangeMarks, segments: 
     }
 }
 
-/// Computes the segments of a tile that are visible but not known, and adds each pixel's sample, unless stopped first.
+/// Computes the segments that are visible but not known, of the pixels of a tile that the goal includes, and adds a sample to
+/// each of these pixels, unless stopped first.
 pub(super) struct GatherSegments<'a> {
     pub view: View<'a>,
     pub segments: &'a mut SegmentTile,
     pub tile: &'a mut Tile,
+    pub goal: Goal,
     pub groups: &'a HistoryGroups,
     pub cells: &'a [Historygram],
     pub positions: &'a ChangeMarks,
@@ -271,28 +274,31 @@ impl Kernel for GatherSegments<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { view, segments, tile, groups, cells, positions, stop } = self;
-        let pixels: Vec<[u32; 2]> = tile.next(usize::MAX).0.collect();
-        segments.invalidate(&view, &pixels, positions);
+        let Self { view, segments, tile, goal, groups, cells, positions, stop } = self;
+        segments.invalidate(&view, tile, positions);
+        let turn = tile.turn(goal);
+        let pixels: Vec<[u32; 2]> = tile.positions(turn.clone()).collect();
         let rays: Vec<(Ray, Track)> = pixels.iter().map(|&pixel| ray_of(view.scene, pixel)).collect();
-        for (ray, _) in rays.iter().enumerate().filter(|(_, (_, track))| track.steps(view.step) == 0) {
-            // The ray misses the volume.
-            let segments = &mut segments.segments[ray * segments.per_ray..(ray + 1) * segments.per_ray];
-            segments.fill(Segment::CLEAR);
+        for (ray, (_, track)) in turn.clone().zip(&rays) {
+            if track.steps(view.step) == 0 {
+                // The ray misses the volume.
+                let segments = &mut segments.segments[ray * segments.per_ray..(ray + 1) * segments.per_ray];
+                segments.fill(Segment::CLEAR);
+            }
         }
         // Rays with missing segments, in pixel order; each round computes one segment per ray.
-        let mut lacking: Vec<usize> =
-            (0..pixels.len()).filter(|&ray| segments.missing(ray).is_some()).collect();
+        let mut lacking: Vec<usize> = turn.clone().filter(|&ray| segments.missing(ray).is_some()).collect();
         while !lacking.is_empty() {
             for packet in lacking.chunks(S::WIDTH) {
                 let mut stretches = Stretches::default();
                 let mut numbers = [0; MOST_LANES];
                 for (lane, &ray) in packet.iter().enumerate() {
                     let segment = segments.missing(ray).unwrap_or(0);
-                    (stretches.rays[lane], stretches.tracks[lane]) = rays[ray];
-                    let count = rays[ray].1.steps(view.step);
+                    let here = ray - turn.start;
+                    (stretches.rays[lane], stretches.tracks[lane]) = rays[here];
+                    let count = rays[here].1.steps(view.step);
                     [stretches.from[lane], stretches.to[lane]] = steps_of(segment, segments.per_ray, count);
-                    stretches.due[lane] = due_in(pixels[ray], segment);
+                    stretches.due[lane] = due_in(pixels[here], segment);
                     numbers[lane] = ray * segments.per_ray + segment;
                 }
                 let bins = view.scene.medium.transfer().bins();
@@ -305,13 +311,13 @@ impl Kernel for GatherSegments<'_> {
                     segments.computed.gathers += found[lane].gathers;
                 }
                 segments.computed.segments += packet.len();
-                if stop.reached() {
+                if stop.reached_now() {
                     return;
                 }
             }
             lacking.retain(|&ray| segments.missing(ray).is_some());
         }
-        for (ray, of_ray) in rays.iter().enumerate() {
+        for (ray, of_ray) in turn.zip(&rays) {
             tile.add(&segments.composite(&view, ray, of_ray));
         }
     }

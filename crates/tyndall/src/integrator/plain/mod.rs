@@ -2,7 +2,7 @@
 //! the list of methods are all that a new method needs.
 
 use super::{Method, Resources, Stop};
-use crate::film::{PixelSample, Tile};
+use crate::film::{Goal, PixelSample, Tile};
 use crate::math::Rgb;
 use crate::scene::{Difference, Scene};
 use schemars::JsonSchema;
@@ -43,9 +43,9 @@ impl Method for Plain {
         difference.view()
     }
 
-    fn refine(&self, scene: &Scene, tile: &mut Tile, (): &mut (), samples: u32, stop: &Stop) {
-        while tile.samples() < samples && !stop.reached() {
-            let Some([x, y]) = tile.next(1).0.next() else { return };
+    fn refine(&self, scene: &Scene, tile: &mut Tile, (): &mut (), goal: Goal, stop: &Stop) {
+        while !stop.reached() {
+            let Some([x, y]) = tile.next(goal, 1).next() else { return };
             let ray = scene.camera.ray(scene.size, [x as f32 + 0.5, y as f32 + 0.5], [0.5; 2]);
             let radiance = self.0 * (1.0 + ray.direction.y.max(0.0));
             tile.add(&PixelSample { radiance, ..PixelSample::default() });

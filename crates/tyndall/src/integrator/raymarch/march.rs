@@ -1,14 +1,14 @@
 //! Marching along packets of view rays, with shadow rays from positions in matter.
 
 use super::Settings;
-use crate::film::{PixelSample, Tile};
+use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::Stop;
 use crate::integrator::view_march::{Coverage, OPAQUE, Shader, composite};
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::{MOST_LANES, PacketMarch, PacketSample, Track};
+use crate::medium::{PacketMarch, PacketSample, Track};
 use crate::scattering::Event;
 use crate::scene::Scene;
-use crate::simd::{Kernel, Lanes, Level};
+use crate::simd::{Kernel, Lanes, Level, MOST_LANES};
 use fearless_simd::prelude::*;
 
 /// The ray marcher with its fixed sample points on lights.
@@ -30,16 +30,16 @@ impl RayMarch {
         Self { step: step * scene.medium.volume().grid().voxel_size(), light_points, level }
     }
 
-    /// Adds rays to the pixels of a tile until each has `samples`; see [`crate::integrator::Method::refine`].
+    /// Adds rays to the pixels of a tile until it reaches the goal; see [`crate::integrator::Method::refine`].
     pub(super) fn refine_tile(
         &self,
         scene: &Scene,
         tile: &mut Tile,
         pending: &mut Option<Box<Packet>>,
-        samples: u32,
+        goal: Goal,
         stop: &Stop,
     ) {
-        self.level.run(MarchPixels { raymarch: self, scene, tile, pending, samples, stop });
+        self.level.run(MarchPixels { raymarch: self, scene, tile, pending, goal, stop });
     }
 
     /// The radiance that arrives along a world ray.
@@ -217,7 +217,7 @@ struct MarchPixels<'a> {
     scene: &'a Scene,
     tile: &'a mut Tile,
     pending: &'a mut Option<Box<Packet>>,
-    samples: u32,
+    goal: Goal,
     stop: &'a Stop<'a>,
 }
 
@@ -226,10 +226,10 @@ impl Kernel for MarchPixels<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { raymarch, scene, tile, pending, samples, stop } = self;
-        while tile.samples() < samples {
+        let Self { raymarch, scene, tile, pending, goal, stop } = self;
+        while !tile.has_reached(goal) {
             let mut packet = pending.take().unwrap_or_else(|| {
-                let (pixels, sample) = tile.next(S::WIDTH);
+                let (pixels, sample) = (tile.next(goal, S::WIDTH), tile.samples());
                 Box::new(Packet::new(scene, pixels.map(|pixel| RayMarch::ray(scene, pixel, sample))))
             });
             if !raymarch.go_on(simd, scene, &mut packet, stop) {

@@ -10,7 +10,7 @@ pub use march::RayMarch;
 pub use settings::Settings;
 
 use super::{Method, Resources, Stop};
-use crate::film::Tile;
+use crate::film::{Goal, Tile};
 use crate::scene::{Difference, Scene};
 use march::Packet;
 
@@ -51,9 +51,9 @@ impl Method for RayMarch {
         scene: &Scene,
         tile: &mut Tile,
         pending: &mut Option<Box<Packet>>,
-        samples: u32,
+        goal: Goal,
         stop: &Stop,
     ) {
-        self.refine_tile(scene, tile, pending, samples, stop);
+        self.refine_tile(scene, tile, pending, goal, stop);
     }
 }
