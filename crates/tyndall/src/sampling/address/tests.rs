@@ -1,18 +1,20 @@
-//! No two purposes share random numbers, but for what is known.
+//! No two purposes share random numbers, except for the known overlaps.
 
 use super::*;
 use crate::math::cast;
 use crate::sampling::{LightPathSampler, PathSampler};
 use std::collections::BTreeSet;
 
-/// Rows that share words today; to be mended in the next change of bits.
+/// Rows that share words today; to be fixed in the next change that alters random numbers.
 const KNOWN_OVERLAPS: [[&str; 2]; 4] = [
-    // Pass 0 at bounce 0: the emitter numbered as the pixel, the path numbered as the sample. By different methods.
+    // Pass 0, bounce 0: emitter number equal to the pixel, path number equal to the sample. Used by different methods.
     ["CameraTracking", "LightTracking"],
-    // Pass 0 at bounce 1 of path 0: the emitter numbered as the sequence, in the block numbered as the pixel. By different methods.
+    // Pass 0, bounce 1 of path 0: emitter number equal to the sequence, block number equal to the pixel. Used by
+    // different methods.
     ["CameraScramble", "LightTracking"],
-    // Bounce 2 of path 0: the emitter numbered as the sequence, in the block numbered as the scrambled emitter. Within one picture:
-    // the scramble of the first 2^16 paths of emitter 0 is the fourth number of the third flight of its first path.
+    // Bounce 2 of path 0: emitter number equal to the sequence, block number equal to the scrambled emitter. Within one
+    // picture: the scramble of the first 2^16 paths of emitter 0 is the fourth number of the third flight of its first
+    // path.
     ["LightScramble", "LightTracking"],
     // A name whose hash has all its bits set.
     ["Named", "Matter"],
@@ -72,7 +74,7 @@ fn purposes_meet_where_it_is_known_and_nowhere_else() {
     let known = BTreeSet::from(KNOWN_OVERLAPS);
     let (new, gone) = (&found - &known, &known - &found);
     assert!(new.is_empty(), "these share random numbers: {new:?}");
-    assert!(gone.is_empty(), "listed, but apart: {gone:?}");
+    assert!(gone.is_empty(), "listed, but no longer overlapping: {gone:?}");
 }
 
 #[test]
@@ -82,7 +84,7 @@ fn rows_meet_if_all_their_words_do() {
     assert_eq!(overlaps(&rows), BTreeSet::from([["a", "b"], ["b", "c"]]));
 }
 
-/// Numbers that are drawn lie in the words from which the overlaps are told.
+/// The words of drawn numbers are within the ranges by which overlaps are found.
 #[test]
 fn words_are_those_of_the_row() {
     let mut numbers = Stream::new(1, [0; 3]);
