@@ -1,11 +1,11 @@
-//! Shining rectangles, disks and spheres.
+//! Rectangles, disks and spheres that emit light.
 
 use super::{Emitted, Enclosure, LightSample, Passed, Target, strength_of_area};
 use crate::math::{Frame, Ray, Rgb, Vec3, cast};
 use crate::sampling::warp;
 use std::f32::consts::PI;
 
-/// A point of a flat light as seen from elsewhere, in solid angle.
+/// A sampled point of a flat light as seen from elsewhere, its pdf over solid angle.
 fn flat_sample(from: Vec3, point: Vec3, normal: Vec3, area: f32, radiance: Rgb) -> Option<LightSample> {
     let to_light = point - from;
     let squared = to_light.length_squared();
@@ -20,7 +20,7 @@ fn flat_sample(from: Vec3, point: Vec3, normal: Vec3, area: f32, radiance: Rgb) 
     None
 }
 
-/// Distance, cosine and the point relative to the middle where a ray passes the shining side of a plane.
+/// Where a ray passes the emitting side of a plane: the distance, the cosine, and the point relative to the middle.
 fn flat_passed(ray: &Ray, middle: Vec3, normal: Vec3) -> Option<(f32, f32, Vec3)> {
     let cos = -ray.direction.dot(normal);
     if cos <= 0.0 {
@@ -30,18 +30,18 @@ fn flat_passed(ray: &Ray, middle: Vec3, normal: Vec3) -> Option<(f32, f32, Vec3)
     (distance > 0.0).then(|| (distance, cos, ray.at(distance) - middle))
 }
 
-/// A rectangle that shines from the side of its target.
+/// A rectangle that emits light on the side that faces its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rect {
     middle: Vec3,
-    /// `u` along the width, `v` along the height, `w` to the shining side.
+    /// `u` along the width, `v` along the height, `w` to the emitting side.
     frame: Frame,
     size: [f32; 2],
     radiance: Rgb,
 }
 
 impl Rect {
-    /// `facing` and `up` are directions of any length; an `up` along `facing` is replaced by any other.
+    /// `facing` and `up` are directions of any length; an `up` parallel to `facing` is replaced by an arbitrary one.
     #[must_use]
     pub fn new(middle: Vec3, facing: Vec3, up: Vec3, size: [f32; 2], radiance: Rgb) -> Self {
         let w = facing.normalize();
@@ -99,7 +99,7 @@ impl Rect {
     }
 }
 
-/// A disk that shines from the side of its target.
+/// A disk that emits light on the side that faces its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disk {
     middle: Vec3,
@@ -109,7 +109,7 @@ pub struct Disk {
 }
 
 impl Disk {
-    /// `facing` is a direction of any length but zero.
+    /// `facing` is a direction of any nonzero length.
     #[must_use]
     pub fn new(middle: Vec3, facing: Vec3, radius: f32, radiance: Rgb) -> Self {
         Self { middle, frame: Frame::around(facing.normalize()), radius, radiance }
@@ -156,7 +156,7 @@ impl Disk {
     }
 }
 
-/// A sphere that shines outwards; inside it there is no light of its own.
+/// A sphere that emits light outwards, and none into its inside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereLight {
     /// Middle, world.
@@ -168,7 +168,7 @@ pub struct SphereLight {
 }
 
 impl SphereLight {
-    /// `1 - cos` of the half angle under which the sphere is seen; `None` from inside.
+    /// `1 - cos` of the half angle that the sphere subtends; `None` from inside.
     fn cap(&self, from: Vec3) -> Option<f32> {
         let sin_squared = self.radius * self.radius / (self.middle - from).length_squared();
         (sin_squared < 1.0).then(|| sin_squared / (1.0 + (1.0 - sin_squared).sqrt()))
@@ -187,7 +187,7 @@ impl SphereLight {
         Some(LightSample { direction, distance, radiance: self.radiance / pdf, pdf })
     }
 
-    /// Distance to the near side; a ray that rounding makes miss the edge touches it.
+    /// Distance to the near side; a ray that misses the edge by rounding counts as touching it.
     fn nearest(&self, ray: &Ray) -> Option<f32> {
         let to_middle = self.middle - ray.origin;
         let along = to_middle.dot(ray.direction);
@@ -208,7 +208,7 @@ impl SphereLight {
         Some(Passed { distance, radiance: self.radiance, pdf: 1.0 / (2.0 * PI * cap) })
     }
 
-    /// From the cap of points whose outward side sees the ball around the box, and so any of the box.
+    /// From the cap of points whose outward side sees any of the ball around the box, and so may see the box.
     pub(super) fn emit(&self, into: &Enclosure, u: [f32; 4]) -> Option<Emitted> {
         let (center, radius) = into.ball();
         let to_box = center - self.middle.as_dvec3();
@@ -218,7 +218,7 @@ impl SphereLight {
         let normal = Frame::around(toward).to_world(warp::cone([u[2], u[3]], lowest)).normalize();
         let area = 2.0 * PI * self.radius * self.radius * (1.0 - lowest);
         let point = self.middle + normal * self.radius;
-        // Around the whole box it lights none of it; with the same ball, `lowest` is no number.
+        // A sphere around the whole box lights none of it; if it equals the ball, `lowest` is NaN.
         if area > 0.0 { Emitted::from_surface(into, point, normal, area, [u[0], u[1]]) } else { None }
     }
 

@@ -19,12 +19,13 @@ pub struct Directional {
 const NARROWEST: f32 = 1e-7;
 
 impl Directional {
-    /// `travel` is where the light goes (any length but zero), `irradiance` what a surface facing it
+    /// `travel` is where the light goes (any nonzero length), `irradiance` what a surface facing it
     /// receives, `angle` the full cone in degrees, 0 (sharp) to 180.
     #[must_use]
     pub fn new(travel: Vec3, irradiance: Rgb, angle: f32) -> Self {
         let half = 0.5 * angle.to_radians();
-        // 1 - cos without cancellation. In a narrower cone all directions are equal in single precision: treat it as sharp.
+        // 1 - cos without cancellation. In a narrower cone all directions are equal in single precision: treat it as
+        // sharp.
         let cap = if half < NARROWEST { 0.0 } else { 2.0 * (0.5 * half).sin().powi(2) };
         Self { frame: Frame::around(-travel.normalize()), irradiance, cap }
     }
@@ -64,11 +65,11 @@ impl Directional {
         self.frame.to_world(turn.with_z(1.0 - drop)).normalize()
     }
 
-    /// Evenly over the silhouette of the box.
+    /// Uniform over the silhouette of the box.
     pub(super) fn emit(&self, into: &Enclosure, u: [f32; 4]) -> Option<Emitted> {
         let travel = -self.toward([u[2], u[3]]);
         let (ray, area) = into.cross(travel.as_dvec3(), [u[0], u[1]])?;
-        // Radiance over density, per irradiance; the irradiance itself when sharp.
+        // Radiance over pdf, per unit of irradiance; 1 when sharp.
         let share = 2.0 / (2.0 - f64::from(self.cap));
         Some(Emitted::evenly(ray, share * area))
     }

@@ -1,4 +1,4 @@
-//! Glowing matter as a light: a point of it is drawn by power, so that a small bright spot is found.
+//! Glowing matter as a light: its points are sampled by power, so that a small bright spot is found.
 
 use super::{Emitted, LightSample, Target};
 use crate::math::{Bounds, Ray, Rgb, Vec3};
@@ -9,22 +9,22 @@ use rayon::prelude::*;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-/// Voxels along the edge of a cell that points are drawn from: small, since a point is drawn evenly in it
-/// and what does not glow there is drawn in vain.
+/// Voxels along the edge of a cell that points are sampled from: small, since a point is uniform in its cell
+/// and wasted where nothing glows.
 const CELL: usize = 4;
 
-/// Share of a cell's weight that is the upper bound of what it emits, the rest being what its voxels show:
-/// what glows between the voxels is found too, and cells that only might glow are seldom asked.
+/// Share of a cell's weight that comes from the upper bound of its emission; the rest comes from its voxels. So
+/// what glows between the voxels is found too, and cells that only might glow are seldom sampled.
 const CAUTION: f32 = 0.1;
 
-/// A point of glowing matter, drawn by power.
+/// A point of glowing matter, sampled by power.
 struct Glow {
-    /// Index space.
+    /// In index space.
     position: Vec3,
     sigma_t: f32,
     /// Emitted radiance per world unit of length.
     emitted: Rgb,
-    /// Density of the position, per world volume.
+    /// Pdf of the position, per unit of world volume.
     per_volume: f32,
 }
 
@@ -73,7 +73,7 @@ impl GlowingCells {
         }
     }
 
-    /// The chance of each, by its power; `None` where nothing glows.
+    /// The probability of each, by its power; `None` where nothing glows.
     fn choice(&self, density: f32) -> Option<Discrete> {
         let power = |(emitted, bounds): (&f32, &Bounds)| {
             f64::from(emitted * density * self.voxel_volume * bounds.size().element_product())
@@ -89,7 +89,7 @@ impl Emission {
         Self::after(None, medium)
     }
 
-    /// [`Self::new`], which shares what an edit left alone with the emission of a medium with the very same matter.
+    /// [`Self::new`] that shares what an edit left unchanged with the emission of a medium with the very same matter.
     #[must_use]
     pub fn after(same_matter: Option<&Self>, medium: &Medium) -> Option<Self> {
         let density = medium.density();
@@ -105,7 +105,7 @@ impl Emission {
         Some(Self { glowing, cells, density })
     }
 
-    /// Whether points are drawn as from the other: each cell with the same chance.
+    /// Whether points are sampled as from the other: each cell with the same probability.
     #[must_use]
     pub fn same_cells(&self, other: &Self) -> bool {
         let (here, there) = (&*self.glowing, &*other.glowing);
@@ -113,15 +113,15 @@ impl Emission {
             || (here.numbers == there.numbers && self.cells == other.cells && here.bounds == there.bounds)
     }
 
-    /// As [`super::Light::strength`]: the power, as if it all came from the target's middle to its border.
+    /// As [`super::Light::strength`]: the power, as if it all came from a target's radius away.
     #[must_use]
     pub fn strength(&self, target: &Target) -> f64 {
         self.cells.total() / f64::from(target.radius * target.radius)
     }
 
-    /// Draws a glowing point and what arrives from it at a world point. The density is that over solid
-    /// angle at which a free flight towards the point would have to collide there, so that both ways
-    /// of finding it can be weighed.
+    /// Samples a glowing point and what arrives from it at a world point. The pdf, over solid angle, is
+    /// the one with which a free flight would have the same density of collisions at the point, so that
+    /// the two ways of finding it can be weighted against each other.
     #[must_use]
     pub fn sample(&self, medium: &Medium, from: Vec3, stream: &mut Stream) -> Option<LightSample> {
         let choice = stream.uniform();
@@ -141,10 +141,10 @@ impl Emission {
         })
     }
 
-    /// Starts a light path from a glowing point to any side; `None` where the point drawn does not glow.
+    /// Starts a light path from a glowing point in any direction; `None` where the sampled point does not glow.
     ///
-    /// `u[0]` and `u[1]` decide the direction, `u[2]` the cell, `u[3]` and the stream the position in it. The flux has its
-    /// colour: its mean, lost paths counted as 0, is the power of the matter, in W.
+    /// `u[0]` and `u[1]` decide the direction, `u[2]` the cell, `u[3]` and the stream the position in it. The flux
+    /// includes the colour: its mean, lost paths counted as 0, is the power of the matter, in W.
     #[must_use]
     pub fn emit(&self, medium: &Medium, u: [f32; 4], stream: &mut Stream) -> Option<Emitted> {
         let glow = self.glow(medium, u[2], Vec3::new(u[3], stream.uniform(), stream.uniform()))?;
@@ -168,7 +168,7 @@ impl Emission {
         (!emitted.is_black()).then_some(Glow { position, sigma_t, emitted, per_volume })
     }
 
-    /// The density of [`Self::sample`] for a collision found by a free flight: at an index-space position
+    /// The pdf of [`Self::sample`] for a collision found by a free flight: at an index-space position
     /// with extinction `sigma_t`, `distance` world units away.
     #[must_use]
     pub fn pdf(&self, position: Vec3, sigma_t: f32, distance: f32) -> f32 {
@@ -180,9 +180,9 @@ impl Emission {
     }
 }
 
-/// Mean over the voxel centres of a cell of the luminance emitted per unit length at density 1.
+/// Luminance emitted per unit length at density 1, averaged over the voxel centres of a cell.
 fn mean_emission(medium: &Medium, cell: &Bounds) -> f32 {
-    // The first centre lies half a voxel inside the cell.
+    // The first centre is half a voxel inside the cell.
     let centres = |axis: usize| -> ([f32; CELL], usize) {
         let (start, end) = (cell.min[axis] + 0.5, cell.max[axis]);
         let all = [0.0, 1.0, 2.0, 3.0].map(|i| start + i);

@@ -1,28 +1,28 @@
-//! Light paths as they start: from a light, into the medium's box.
+//! Starts of light paths: from a light into the medium's box.
 
 use super::{Enclosure, Light};
 use crate::math::{Frame, Ray, Rgb, Vec3, cast};
 use crate::sampling::warp;
 use std::f64::consts::PI;
 
-/// A light path as it starts.
+/// The start of a light path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Emitted {
-    /// World ray that goes with the light. It starts at the light, or farther on, but not behind where it enters the
+    /// World ray along the light's travel. It starts at the light, or farther on, but not beyond where it enters the
     /// box; a few miss the box, by rounding or because they start on its border.
     pub ray: Ray,
-    /// Flux per unit of the light's colour, over the density of drawing the path: its mean over all numbers, lost
+    /// Flux per unit of the light's colour, over the pdf of the path: its mean over all random numbers, lost
     /// paths counted as 0, times [`Light::color`] is the light's power into the box, in W.
     pub flux: Rgb,
 }
 
 impl Emitted {
-    /// `measure` is the area, the solid angle, or their product that the paths are drawn from.
+    /// `measure` is the area, the solid angle, or their product that the paths are sampled from.
     pub(super) fn evenly(ray: Ray, measure: f64) -> Self {
         Self { ray, flux: Rgb::splat(cast::single(measure)) }
     }
 
-    /// A path from a point of a surface of radiance 1; `area` is the whole that the point was drawn from.
+    /// A path from a point of a surface of radiance 1; `area` is the whole area that the point was sampled from.
     pub(super) fn from_surface(
         into: &Enclosure,
         point: Vec3,
@@ -43,8 +43,8 @@ impl Emitted {
 impl Light {
     /// Starts a light path into the box; `None` if these numbers start none.
     ///
-    /// `u[0]` and `u[1]` decide where in the box it goes, neighbouring numbers on neighbouring rays; `u[2]` and `u[3]`
-    /// the rest: the point on the light, or the direction in its cone or in the sky.
+    /// `u[0]` and `u[1]` decide where into the box it goes, nearby numbers giving nearby rays; `u[2]` and `u[3]`
+    /// decide the rest: the point on the light, or the direction in its cone or in the sky.
     #[inline]
     #[must_use]
     pub fn emit(&self, into: &Enclosure, u: [f32; 4]) -> Option<Emitted> {
@@ -56,7 +56,7 @@ impl Light {
             Self::Sphere(l) => l.emit(into, u),
             Self::Environment(l) => l.emit(into, u),
         };
-        // Past single precision there is no light that a picture could show.
+        // A flux beyond single precision is more than a picture could show.
         emitted.filter(|e| e.flux.is_finite())
     }
 
@@ -74,7 +74,7 @@ impl Light {
         }
     }
 
-    /// Whether the other light sends the same paths: equal in all but [`Self::color`] and in what the camera sees of it.
+    /// Whether the other light sends the same paths: equal except in [`Self::color`] and in what the camera sees of it.
     #[must_use]
     pub fn same_paths(&self, other: &Self) -> bool {
         match (self, other) {

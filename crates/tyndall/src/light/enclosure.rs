@@ -1,29 +1,30 @@
-//! The medium's box, as what light paths are sent into.
+//! The medium's box as the target of light paths.
 
 use super::triangle::{Corner, HalfAngle, SphericalTriangle};
 use crate::math::{DMat3, DVec3, Ray, Vec3};
 use crate::volume::Grid;
 
-/// Radii of the box by which parallel rays start before it, so that no rounding makes them start behind a face.
+/// Distance in front of the box at which parallel rays start, in radii of the box, so that no rounding makes them start
+/// behind a face.
 const BEFORE: f64 = 0.01;
 
-/// Share of an edge by which a point may stand off a face and still be on it: far less than single precision can
-/// tell, and so much that the solid angle in double precision is not lost in rounding.
+/// Distance from a face, as a share of an edge, within which a point counts as on it: far less than single precision
+/// can resolve, and enough that the solid angle in double precision is not lost in rounding.
 const HAIR: f64 = 1e-9;
 
-/// Radii of the box from which on light from a point is parallel, to single precision.
+/// Distance, in radii of the box, beyond which light from a point is parallel in single precision.
 const FAR: f64 = 1e7;
 
-/// The medium's box in the world: a parallelepiped, since grids may be turned, sheared and left-handed.
+/// The medium's box in the world: a parallelepiped, since grids may be rotated, sheared and left-handed.
 ///
-/// In double precision: what lights need of it are differences, of a far light's rays or of a near light's height
+/// In double precision, since lights need small differences: between a far light's rays, or a near light's height
 /// above a face.
 #[derive(Clone, Copy, Debug)]
 pub struct Enclosure {
     /// Where the edges start.
     corner: DVec3,
     edges: [DVec3; 3],
-    /// Per edge, the outward normal of the face at its end, as long as the face has area.
+    /// Per edge, the outward normal of the face at its end; its length is the face's area.
     normals: [DVec3; 3],
     volume: f64,
     center: DVec3,
@@ -54,7 +55,7 @@ impl Face {
 }
 
 impl Enclosure {
-    /// The box of a grid, half a voxel past its outer centres.
+    /// The box of a grid, half a voxel past its outer voxel centres.
     #[must_use]
     pub fn new(grid: &Grid) -> Self {
         let axes = DMat3::from_cols_array_2d(&grid.direction()).transpose();
@@ -75,15 +76,15 @@ impl Enclosure {
         (self.center, self.radius)
     }
 
-    /// Whether a world point lies inside or on the border.
+    /// Whether a world point is inside or on the border.
     pub(super) fn contains(&self, point: Vec3) -> bool {
         self.above(point.as_dvec3()) == [0.0; 3]
     }
 
     /// A ray along `travel` (unit), uniform over the silhouette that the box has in this direction, and the
-    /// silhouette's area, [world units^2]. The ray starts before the box.
+    /// silhouette's area, [world units^2]. The ray starts in front of the box.
     pub(super) fn cross(&self, travel: DVec3, u: [f32; 2]) -> Option<(Ray, f64)> {
-        // The faces that the light meets lie one on each axis, as large in the silhouette as their normals say.
+        // The light meets one face per axis, whose area in the silhouette follows from its normal.
         let along = self.normals.map(|n| n.dot(travel));
         let areas = along.map(f64::abs);
         let (axis, left) = choose(&areas, u[0])?;
@@ -93,8 +94,8 @@ impl Enclosure {
     }
 
     /// A ray from a point outside, uniform over the solid angle of the box, and this solid angle, [sr]. The ray starts
-    /// at the point, or nearer to the box but before it. `None` from inside, and where rounding leaves no answer
-    /// because the box has edges of extremely unlike length.
+    /// at the point, or nearer to the box but in front of it. `None` from inside, and where rounding leaves no answer
+    /// because the box has edges of extremely different lengths.
     pub(super) fn aim(&self, from: Vec3, u: [f32; 2]) -> Option<(Ray, f64)> {
         let from = from.as_dvec3();
         let to_center = self.center - from;
@@ -105,7 +106,7 @@ impl Enclosure {
         }
         let above = self.above(from);
         let triangles = |axis: usize| self.face(axis, above[axis] > 0.0).triangles(from, above[axis].abs());
-        // Two triangles per axis. Made again when chosen: to keep them costs more.
+        // Two triangles per axis. The chosen one is recomputed: keeping them all costs more.
         let mut halves = [HalfAngle::ZERO; 6];
         let mut sum = HalfAngle::ZERO;
         for axis in (0..3).filter(|&axis| above[axis] != 0.0) {
@@ -129,7 +130,7 @@ impl Enclosure {
         let (i, part) = chosen?;
         let triangle = triangles(i / 2)[i % 2];
         let direction = triangle.sample(part, f64::from(u[1]));
-        // A ray's direction is single precision, which at a distance would miss.
+        // A ray's direction is in single precision and would miss from far away.
         let origin = from + direction * (distance - (1.0 + BEFORE) * self.radius).max(0.0);
         let ray = Ray::new(origin.as_vec3(), direction.as_vec3());
         direction.is_finite().then_some((ray, 2.0 * whole))
@@ -155,7 +156,7 @@ impl Enclosure {
 }
 
 /// One of several by share, and a uniform number left over from the choice; `None` if there is no positive share, or
-/// one that is no number.
+/// one is not a number.
 fn choose(shares: &[f64], u: f32) -> Option<(usize, f64)> {
     let total: f64 = shares.iter().sum();
     if !(total > 0.0 && total.is_finite()) {

@@ -19,12 +19,12 @@ enum Sky {
     Constant(Rgb),
     Map {
         map: Arc<Map>,
-        /// Map coordinates to the world: `w` is up, `u` where the middle column lies.
+        /// Map coordinates to the world: `w` is up, `u` points to the middle column.
         frame: Frame,
     },
 }
 
-/// Maps are compared by identity first: those of one scene edited are shared.
+/// Maps are compared by identity first: an edited scene shares its maps.
 impl PartialEq for Sky {
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
@@ -46,9 +46,9 @@ impl Environment {
         Self { sky: Sky::Constant(radiance), visible }
     }
 
-    /// A map around the axis `up` (unit). Its middle column lies where a viewer looks who stands
-    /// upright and faces -z (+y when +z is up), turned by `rotation` degrees to that viewer's left;
-    /// to the right of it lies what the viewer has at the right hand.
+    /// A map around the axis `up` (unit). Its middle column is straight ahead of an upright viewer
+    /// who faces -z (+y when +z is up), turned by `rotation` degrees to that viewer's left;
+    /// what is right of it in the map is to the viewer's right.
     #[must_use]
     pub fn map(map: Arc<Map>, up: Vec3, rotation: f32, visible: bool) -> Self {
         let ahead = if up.z.abs() > 0.5 { Vec3::Y } else { -Vec3::Z };
@@ -95,7 +95,7 @@ impl Environment {
         Passed { distance: f32::INFINITY, radiance, pdf }
     }
 
-    /// Evenly over the silhouette that the box has in a direction drawn as by [`Self::sample`].
+    /// Uniform over the silhouette of the box in a direction sampled as by [`Self::sample`].
     pub(super) fn emit(&self, into: &Enclosure, u: [f32; 4]) -> Option<Emitted> {
         let direction = self.toward([u[2], u[3]])?;
         let (ray, area) = into.cross(-direction.as_dvec3(), [u[0], u[1]])?;
@@ -127,7 +127,7 @@ impl Environment {
             Sky::Constant(radiance) => f64::from(radiance.luminance()),
             Sky::Map { map, .. } => map.mean_luminance(),
         };
-        // What a small sphere's cross-section receives from all sides, per cross-section.
+        // What a small sphere receives from all sides, per area of its cross-section.
         4.0 * std::f64::consts::PI * mean
     }
 }
@@ -138,7 +138,7 @@ pub struct Map {
     width: usize,
     height: usize,
     texels: Vec<Rgb>,
-    /// Chance of each row, and of each column within a row; `None` if the map is black.
+    /// Probability of each row, and of each column within a row; `None` if the map is black.
     rows: Option<Discrete>,
     columns: Vec<Option<Discrete>>,
 }
@@ -191,8 +191,8 @@ impl Map {
 
     /// Mean luminance of the bilinear texture over each texel of a row, times the texel's solid angle.
     ///
-    /// A texel next to a bright one is not black where it is read bilinearly; the mean knows that, so
-    /// that nothing bright has no chance.
+    /// A black texel next to a bright one is not black when read bilinearly; the mean includes that, so
+    /// that nothing bright has probability 0.
     fn row_weights(&self, y: usize) -> Vec<f64> {
         let smooth = [0.125, 0.75, 0.125];
         let tap = |c: usize, n: usize, k: usize, wrap: bool| match (c + k).checked_sub(1) {
@@ -239,7 +239,7 @@ impl Map {
 
     /// Texture coordinates of a local direction, in texels.
     fn texture(&self, d: Vec3) -> [f32; 2] {
-        // Longitude grows to the right of one who looks along u with w up: towards -v.
+        // Longitude grows to the right of a viewer who looks along u with w up: towards -v.
         let turn = (-d.y).atan2(d.x) / TAU + 0.5;
         let drop = d.z.clamp(-1.0, 1.0).acos() * FRAC_1_PI;
         [turn * self.width as f32, drop * self.height as f32]

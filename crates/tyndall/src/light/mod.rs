@@ -1,5 +1,5 @@
-//! Sources of light. They are sources only: the camera does not see them (but for a visible
-//! environment), they cast no shadow and block nothing, and they may stand inside the volume.
+//! Sources of light. They are sources only: the camera does not see them (except for a visible
+//! environment), they cast no shadow and block nothing, and they may be inside the volume.
 
 mod area;
 mod directional;
@@ -26,7 +26,7 @@ use crate::math::{Ray, Rgb, Vec3};
 /// which the variance of the picture needs.
 pub const BRIGHTEST: f32 = 1e18;
 
-/// A sphere around all that can be lit: what lights judge their power by.
+/// A sphere around everything that can be lit, for which the power of lights is estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {
     /// Middle, world.
@@ -35,17 +35,17 @@ pub struct Target {
     pub radius: f32,
 }
 
-/// A direction towards a light, drawn from a point.
+/// A direction towards a light, sampled from a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
     /// Unit vector to the light.
     pub direction: Vec3,
     /// How far the light is; infinite for distant ones.
     pub distance: f32,
-    /// What arrives in empty space, over the density of drawing it: its mean times the scattering
-    /// function is the light scattered.
+    /// Radiance that arrives in empty space, over the pdf: the mean of its product with the
+    /// scattering function is the scattered light.
     pub radiance: Rgb,
-    /// Density over solid angle; infinite where no other way could draw this direction.
+    /// Pdf over solid angle; infinite where no other technique could sample this direction.
     pub pdf: f32,
 }
 
@@ -56,7 +56,7 @@ pub struct Passed {
     pub distance: f32,
     /// Radiance towards the ray's origin.
     pub radiance: Rgb,
-    /// Density with which [`Light::sample`] from the ray's origin would have drawn its direction.
+    /// Pdf with which [`Light::sample`] from the ray's origin would have sampled its direction.
     pub pdf: f32,
 }
 
@@ -78,7 +78,7 @@ pub enum Light {
 }
 
 impl Light {
-    /// Draws a direction towards the light from a world point; `None` if it sends nothing there.
+    /// Samples a direction towards the light from a world point; `None` if it sends nothing there.
     #[inline]
     #[must_use]
     pub fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
@@ -92,7 +92,7 @@ impl Light {
         }
     }
 
-    /// The light's position on a ray, if the ray passes its shining side.
+    /// Where a ray passes the light, if it passes its emitting side.
     #[inline]
     #[must_use]
     pub fn passed(&self, ray: &Ray) -> Option<Passed> {
@@ -106,7 +106,7 @@ impl Light {
         }
     }
 
-    /// Whether a ray can pass it at all: not so for points and parallel light.
+    /// Whether a ray can pass it at all: false for points and parallel light.
     #[must_use]
     pub fn can_be_passed(&self) -> bool {
         match self {
@@ -117,7 +117,7 @@ impl Light {
     }
 
     /// Luminance of the light that reaches the target, roughly, as an irradiance: the weight by which
-    /// lights are chosen. Positive for every light that shines.
+    /// lights are chosen. Positive for every light that is not black.
     #[must_use]
     pub fn strength(&self, target: &Target) -> f64 {
         match self {
@@ -131,7 +131,7 @@ impl Light {
     }
 }
 
-/// Luminance of a radiance seen under the area of a small source from a target, as an irradiance.
+/// Luminance of the irradiance at a target from a small source of given radiance and area.
 fn strength_of_area(radiance: Rgb, area: f32, position: Vec3, target: &Target) -> f64 {
     let distance = position.distance(target.center).max(target.radius);
     f64::from(radiance.luminance()) * f64::from(area) / f64::from(distance * distance)

@@ -5,10 +5,10 @@ use crate::math::{Ray, Rgb, Vec3};
 use crate::sampling::warp;
 use std::f64::consts::PI;
 
-/// Shines equally to all sides from one point.
+/// Emits equally in all directions from one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLight {
-    /// Where, world.
+    /// World position.
     pub position: Vec3,
     /// Radiant intensity, W/sr.
     pub intensity: Rgb,
@@ -27,7 +27,7 @@ impl PointLight {
         Some(LightSample { direction: to_light / distance, distance, radiance, pdf: f32::INFINITY })
     }
 
-    /// From outside into the solid angle of the box, from inside to all sides.
+    /// From outside into the solid angle of the box, from inside in all directions.
     pub(super) fn emit(&self, into: &Enclosure, u: [f32; 4]) -> Option<Emitted> {
         let toward = [u[0], u[1]];
         if into.contains(self.position) {

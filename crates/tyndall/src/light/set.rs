@@ -1,4 +1,4 @@
-//! All lights of a scene together, chosen among by power.
+//! All lights of a scene together, and the choice among them by power.
 
 use super::{Emission, Environment, Light, LightSample, Target};
 use crate::math::{Ray, Rgb, Vec3};
@@ -65,7 +65,7 @@ impl LightSet {
         })
     }
 
-    /// Draws a light by power and a direction to it; the sample's density counts the choice.
+    /// Samples a light by power and a direction to it; the sample's pdf includes the choice.
     #[inline]
     #[must_use]
     pub fn sample(
@@ -84,7 +84,7 @@ impl LightSet {
     }
 
     /// Light that a scattered ray gathers by passing lights nearer than `end`, each weighted against
-    /// [`Self::sample`] by the balance heuristic \[Veach97\]; `pdf` is the density of the ray's direction.
+    /// [`Self::sample`] by the balance heuristic \[Veach97\]; `pdf` is that of the ray's direction.
     #[inline]
     #[must_use]
     pub fn passed(&self, ray: &Ray, end: f32, pdf: f32) -> Rgb {

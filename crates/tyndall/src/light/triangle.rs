@@ -3,8 +3,8 @@
 use crate::math::DVec3;
 use std::f64::consts::TAU;
 
-/// Half a solid angle, from 0 to pi, as the complex number of any length that has it as argument: sums are products,
-/// and cost no function of trigonometry.
+/// Half a solid angle, from 0 to pi, as a complex number of any magnitude with that argument: sums become products
+/// and need no trigonometric functions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HalfAngle {
     re: f64,
@@ -36,12 +36,12 @@ impl HalfAngle {
 
     pub(super) fn radians(self) -> f64 {
         let radians = self.im.atan2(self.re);
-        // Rounding takes a half sphere past pi.
+        // Rounding can take a half sphere past pi.
         if radians < 0.0 { radians + TAU } else { radians }
     }
 }
 
-/// A corner of a solid triangle as seen from the eye.
+/// A corner of a triangle as seen from the eye.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Corner {
     /// Unit vector to it.
@@ -60,8 +60,8 @@ impl Corner {
 
 /// The directions in which a plane triangle is seen.
 ///
-/// In double precision, and written with differences of directions instead of 1 less their cosine, so that
-/// triangles of 1e-7 radians and those that the eye all but touches keep their shape.
+/// In double precision, using differences of directions instead of 1 minus their cosine, so that
+/// triangles of 1e-7 radians and those that the eye almost touches keep their shape.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SphericalTriangle {
     /// Unit vectors to the corners.
@@ -72,7 +72,7 @@ pub(super) struct SphericalTriangle {
 
 impl SphericalTriangle {
     /// `volume` is that spanned by the three vectors to the corners, not negative: the caller knows it from
-    /// the height of the eye above the triangle's plane, which a determinant of small differences loses.
+    /// the height of the eye above the triangle's plane, which a determinant of small differences would lose.
     #[inline]
     pub(super) fn new([a, b, c]: [Corner; 3], volume: f64) -> Self {
         let volume = volume * (a.nearness * b.nearness * c.nearness);
@@ -88,12 +88,12 @@ impl SphericalTriangle {
 
     /// A direction uniform over the triangle; not finite if the triangle has no extent.
     ///
-    /// As \[Arvo95\]: a triangle `a b d` with `part` of the half angle, uniform, is cut off, `d` between `a` and `c`; then
-    /// a uniform `way` goes from `b` to `d`, evenly in the cosine. Where the paper finds `d` by spherical trigonometry,
-    /// here the formula for the solid angle is solved for the tangent of half the arc from `a` to `d`.
+    /// As \[Arvo95\]: cuts off a triangle `a b d`, `d` between `a` and `c`, whose half angle is `part` (uniform); then
+    /// goes the share `way` (uniform) from `b` to `d`, evenly in the cosine. The paper finds `d` by spherical
+    /// trigonometry; here the formula for the solid angle is solved for the tangent of half the arc from `a` to `d`.
     pub(super) fn sample(&self, part: HalfAngle, way: f64) -> DVec3 {
         let [a, b, c] = self.corners;
-        // What c has at right angles to a; its length is the sine of their arc.
+        // The component of c perpendicular to a; its length is the sine of their arc.
         let across = (c - a) + a * drop(a, c);
         let length = across.length();
         let one_and_cos = 0.5 * (a + b).length_squared();
@@ -108,7 +108,7 @@ impl SphericalTriangle {
     }
 }
 
-/// 1 less the cosine between two unit vectors.
+/// 1 minus the cosine between two unit vectors.
 fn drop(a: DVec3, b: DVec3) -> f64 {
     0.5 * (a - b).length_squared()
 }

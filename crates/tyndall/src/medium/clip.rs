@@ -1,25 +1,25 @@
-//! Cutting matter away: half spaces, whose common part is all that is left.
+//! Clipping: half spaces, whose intersection is what is kept.
 
 use crate::math::{Bounds, Interval, Ray, Vec3};
 use crate::simd::Lanes;
 use crate::volume::Grid;
 use fearless_simd::prelude::*;
 
-/// A cut in the world.
+/// A cut in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ClipShape {
     /// The side that the normal points to is cut away.
     Plane {
         /// A point of the plane.
         point: Vec3,
-        /// Points to what is cut; any length but zero.
+        /// Points to what is cut away; any nonzero length.
         normal: Vec3,
     },
     /// The outside is cut away.
     Box(Bounds),
 }
 
-/// All cuts together, in index space. What is left is convex, so a ray meets it in one stretch.
+/// All cuts together, in index space. What is kept is convex, so a ray crosses it in one segment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Clip {
     half_spaces: Vec<HalfSpace>,
@@ -33,7 +33,7 @@ struct HalfSpace {
 }
 
 impl Clip {
-    /// Brings world cuts into a grid's index space.
+    /// Transforms world-space cuts to a grid's index space.
     #[must_use]
     pub fn new(grid: &Grid, shapes: &[ClipShape]) -> Self {
         let mut half_spaces = Vec::new();
@@ -58,7 +58,7 @@ impl Clip {
         Self { half_spaces }
     }
 
-    /// Whether a position of index space per lane is left.
+    /// Whether each lane's index-space position is kept.
     #[inline(always)]
     pub(super) fn keeps_lanes<S: Lanes>(
         &self,
@@ -73,7 +73,7 @@ impl Clip {
         kept
     }
 
-    /// The part of a stretch of an index-space ray that is left.
+    /// The part of an index-space ray segment that is kept.
     #[inline]
     pub(super) fn cut(&self, ray: &Ray, mut stretch: Interval) -> Interval {
         for half in &self.half_spaces {
@@ -90,7 +90,7 @@ impl Clip {
         stretch
     }
 
-    /// Whether one plane alone leaves nothing of a box in index space.
+    /// Whether a single plane cuts away all of an index-space box.
     #[must_use]
     pub fn cuts_all(&self, bounds: &Bounds) -> bool {
         let beyond =
@@ -98,7 +98,7 @@ impl Clip {
         self.half_spaces.iter().any(beyond)
     }
 
-    /// Whether an index-space point is left.
+    /// Whether an index-space point is kept.
     pub(super) fn keeps(&self, p: Vec3) -> bool {
         self.half_spaces.iter().all(|half| half.normal.dot(p) <= half.offset)
     }
@@ -128,7 +128,7 @@ mod tests {
             *(if expected { &mut kept } else { &mut cut }) += 1;
         }
         assert!(kept > 50 && cut > 50, "{kept} kept, {cut} cut");
-        // A ray's stretch has its ends on the border and its inside kept.
+        // The ends of a ray's segment are on the border, and its inside is kept.
         let ray = Ray::new(Vec3::new(-5.0, 4.0, 3.0), Vec3::new(1.0, 0.1, 0.05));
         let stretch = clip.cut(&ray, Interval::AHEAD);
         assert!(!stretch.is_empty());

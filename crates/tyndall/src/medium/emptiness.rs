@@ -1,12 +1,13 @@
-//! How far around a cell all is empty: a chessboard distance transform \[Rosenfeld66\].
+//! How far around a cell everything is empty: a chessboard distance transform \[Rosenfeld66\].
 
 use rayon::prelude::*;
 
-/// Per cell how many cells on, to some side, the nearest one with matter is, up to 255; 0 for a cell that has matter itself.
-/// What lies outside of the grid is empty. In parallel on the current pool.
+/// Per cell the chessboard distance, in cells, to the nearest cell with matter, up to 255; 0 for a cell with matter
+/// itself. Everything outside the grid is empty. In parallel on the current pool.
 ///
-/// The largest of three distances along the axes is found axis by axis: along each one the nearest cell, of which what the axes
-/// before have found counts as far as it is more than the distance along this one.
+/// That distance is the largest of the three along the axes. It is minimized axis by axis: over the cells of a line,
+/// each pass takes the minimum of the larger of the distance along the line and what the earlier passes found for the
+/// cell.
 pub(super) fn extents(dims: [usize; 3], opacities: &[[f32; 2]]) -> Vec<u8> {
     let matter = |opacity: &[f32; 2]| if opacity[1] > 0.0 { 0 } else { u8::MAX };
     let mut distance: Vec<u8> = opacities.iter().map(matter).collect();
@@ -23,21 +24,21 @@ pub(super) fn extents(dims: [usize; 3], opacities: &[[f32; 2]]) -> Vec<u8> {
     distance
 }
 
-/// Cells that a thread takes at least: some tens of microseconds of work.
+/// Fewest cells that a thread takes: some tens of microseconds of work.
 const LEAST: usize = 2048;
 
-/// A cell on its way along an axis.
+/// A cell and its line along an axis.
 #[derive(Clone, Copy)]
 struct Line {
     i: usize,
     position: usize,
     /// Cells along the axis.
     cells: usize,
-    /// From a cell to the next.
+    /// Index step from a cell to the next.
     stride: usize,
 }
 
-/// The least, over the cells of a line, of the larger of distance along it and distance found so far.
+/// The minimum, over the cells of a line, of the larger of the distance along it and the distance found so far.
 fn along(found: &[u8], line: Line) -> u8 {
     let Line { i, position, cells, stride } = line;
     let mut nearest = found[i];
@@ -59,7 +60,7 @@ mod tests {
     use super::*;
     use tyndall_testing::SplitMix;
 
-    /// By looking at every cell.
+    /// Brute force over all cells.
     fn by_definition(dims: [usize; 3], opacities: &[[f32; 2]], i: usize) -> u8 {
         let coordinates = |i: usize| [i % dims[0], i / dims[0] % dims[1], i / (dims[0] * dims[1])];
         let here = coordinates(i);

@@ -1,7 +1,7 @@
 //! Free flight and transmittance through inhomogeneous matter.
 //!
-//! Both walk the cells of the [`MajorantGrid`](super::MajorantGrid) and know of each the smallest and
-//! the largest extinction. Where these agree the cell is homogeneous and nothing is looked up. A step too
+//! Both walk the cells of the [`MajorantGrid`](super::MajorantGrid), which holds the smallest and the
+//! largest extinction of each. Where these are equal the cell is homogeneous and nothing is looked up. A step too
 //! short for single precision still advances by one unit in the last place, so that no flight gets stuck.
 
 use super::{CellStretch, Medium, Track};
@@ -11,10 +11,10 @@ use crate::simd::MOST_LANES;
 use crate::simd::{Kernel, Lanes, Level};
 use fearless_simd::prelude::*;
 
-/// Below this weight a transmittance estimate is subject to Russian roulette: darker ones are not worth their look-ups.
+/// Transmittance estimates below this weight undergo Russian roulette: they are not worth their look-ups.
 const ROULETTE_WEIGHT: f32 = 0.1;
 
-/// Optical thickness of the control after which the same holds.
+/// Optical thickness of the control above which an estimate undergoes Russian roulette too.
 const ROULETTE_DEPTH: f32 = 2.5;
 
 /// A real collision of a free flight.
@@ -28,18 +28,18 @@ pub struct Collision {
     pub value: f32,
 }
 
-/// Listener to all that a flight or a transmittance estimate reads.
+/// Listener to everything that a flight or a transmittance estimate reads.
 pub(crate) trait FlightNotes {
     /// Whether there is a listener; then empty cells are crossed one by one, so that each is reported.
     const LISTENS: bool = true;
 
-    /// The majorant of a cell.
+    /// A cell's majorant is read.
     fn most(&mut self, cell: usize);
 
-    /// The smallest and the largest opacity of a cell.
+    /// A cell's smallest and largest opacity are read.
     fn limits(&mut self, cell: usize);
 
-    /// The opacity of a data value.
+    /// The opacity of a data value is read.
     fn value(&mut self, value: f32);
 }
 
@@ -62,15 +62,15 @@ impl Medium {
     /// \[Woodcock65\] with local majorants \[Yue10\].
     ///
     /// `first` is the optical depth to the first tentative collision, exponentially distributed; the
-    /// numbers of later ones come from `stream`.
+    /// random numbers for later ones come from `stream`.
     #[inline]
     #[must_use]
     pub fn free_flight(&self, track: &Track, first: f32, stream: &mut Stream) -> Option<Collision> {
         self.free_flight_noting(track, first, stream, &mut ())
     }
 
-    /// [`Self::free_flight`] that reports all that it depends on: the numbers that it draws depend on the majorants of the cells
-    /// that it crosses, and on no other.
+    /// [`Self::free_flight`] that reports everything it depends on: its random numbers depend on the majorants of the
+    /// cells that it crosses, and on no others.
     #[inline(always)]
     pub(crate) fn free_flight_noting<N: FlightNotes>(
         &self,
@@ -118,8 +118,8 @@ impl Medium {
     }
 
     /// An unbiased estimate of the transmittance along a track: residual ratio tracking \[Novak14\], in
-    /// which each cell's smallest extinction is the control and is integrated exactly. Where the tentative collisions lie
-    /// does not depend on what is found there, so that many are looked up at once. Tells all that it reads.
+    /// which each cell's smallest extinction is the control and is integrated exactly. The positions of the tentative
+    /// collisions do not depend on the values found there, so many are looked up at once. Reports everything it reads.
     #[inline(always)]
     pub(crate) fn transmittance_lanes<S: Lanes, N: FlightNotes>(
         &self,
@@ -150,7 +150,7 @@ impl Medium {
         let mut collisions = Tentative::new();
         for cell in cells {
             notes.limits(cell.cell);
-            // Again and again, so that it does not matter how many empty cells follow.
+            // Repeated, so that it does not matter how many empty cells follow.
             while control > ROULETTE_DEPTH {
                 if stream.uniform() >= (-ROULETTE_DEPTH).exp() {
                     return 0.0;
@@ -205,7 +205,7 @@ struct Tentative {
     enough: usize,
 }
 
-/// So many at first, since light is often lost at once; then twice as many each time.
+/// Size of the first batch: small, since light is often lost at once. Each later batch is twice as large.
 const FIRST_TENTATIVE: usize = 2;
 
 impl Tentative {
@@ -220,7 +220,7 @@ impl Tentative {
         }
     }
 
-    /// Whether there are enough.
+    /// Adds one; whether there are now enough.
     #[inline(always)]
     fn push<S: Lanes>(&mut self, t: f32, least: f32, spread: f32) -> bool {
         self.t[self.count] = t;
@@ -230,7 +230,7 @@ impl Tentative {
         self.count == S::WIDTH.min(self.enough)
     }
 
-    /// The product of the chances that the pending collisions are no real ones.
+    /// Takes the pending collisions: the product of their probabilities of not being real.
     #[inline(always)]
     fn take<S: Lanes, N: FlightNotes>(
         &mut self,

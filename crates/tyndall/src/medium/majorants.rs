@@ -12,12 +12,12 @@ pub struct MajorantGrid {
     dims: [i32; 3],
     edge: f32,
     opacities: Vec<[f32; 2]>,
-    /// Per cell the distance, in cells, to the nearest cell with matter (chessboard metric), so that a ray leaps over the empty cells
-    /// between; 0 where there is matter. Padded, since kernels over lanes may read a few bytes past a cell's.
+    /// Per cell the distance, in cells, to the nearest cell with matter (chessboard metric), so that rays can skip the
+    /// empty cells between; 0 where there is matter. Padded, since SIMD kernels may read a few bytes past a cell's.
     empty: Vec<u8>,
 }
 
-/// The stretch of a track inside one cell, or inside several empty ones.
+/// The segment of a track inside one cell, or across several empty ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CellStretch {
     /// Distance where it begins.
@@ -28,7 +28,7 @@ pub struct CellStretch {
     pub least: f32,
     /// Largest opacity in the cell.
     pub most: f32,
-    /// The cell's number, x fastest; the first one's of several.
+    /// The cell's number, x fastest; that of the first if there are several.
     pub cell: usize,
 }
 
@@ -75,15 +75,15 @@ impl MajorantGrid {
         &self.empty
     }
 
-    /// The cells along a track in order, empty ones that follow each other in one stretch as far as can be seen.
+    /// The cells along a track in order; consecutive empty ones are merged as far as the distance to matter allows.
     #[inline(always)]
     #[must_use]
     pub fn walk(&self, track: &Track) -> CellWalk<'_> {
         CellWalk::new(self, track)
     }
 
-    /// The cells along a track in order, each by itself. Stretches with matter are those of [`Self::walk`] to the last bit, so
-    /// that results computed along them do not depend on empty space beside the ray.
+    /// The cells along a track in order, one by one. Segments with matter are those of [`Self::walk`] to the last bit,
+    /// so that results computed along them do not depend on empty space beside the ray.
     #[inline(always)]
     #[must_use]
     pub fn walk_singly(&self, track: &Track) -> CellWalk<'_, false> {
@@ -91,7 +91,7 @@ impl MajorantGrid {
     }
 }
 
-/// Goes along a track from cell to cell; if it `LEAPS`, at once over empty ones. The stretches join without gaps.
+/// Goes along a track cell by cell; if it `LEAPS`, over several empty ones at once. The segments join without gaps.
 #[derive(Clone, Debug)]
 pub struct CellWalk<'a, const LEAPS: bool = true> {
     grid: &'a MajorantGrid,
@@ -110,7 +110,7 @@ struct Axis {
     sign: i32,
     /// Cells of the grid.
     cells: i32,
-    /// The present cell.
+    /// The current cell.
     position: i32,
     /// Where the track leaves it.
     next: f32,
@@ -125,7 +125,7 @@ impl Axis {
         Self { next: axis.exit(position), ..axis }
     }
 
-    /// Where the track leaves the cells up to `last`; the outermost reach to the track's end.
+    /// Where the track leaves the cells up to `last`; the outermost cells extend to the track's end.
     #[inline(always)]
     fn exit(&self, last: i32) -> f32 {
         let border = last + i32::from(self.sign > 0);
@@ -136,7 +136,7 @@ impl Axis {
         }
     }
 
-    /// Where the track leaves the cells up to `ahead` on.
+    /// Where the track leaves the cell that is `ahead` cells on.
     #[inline(always)]
     fn exit_ahead(&self, ahead: i32) -> f32 {
         self.exit(self.position + ahead * self.sign)
@@ -148,8 +148,8 @@ impl Axis {
         self.next = self.exit(position);
     }
 
-    /// Moves past exactly those borders that come before another axis's at distance `leave`; of borders at equal distances those of
-    /// the `higher` axis come first, as in [`nearest`].
+    /// Moves past exactly those borders that come before another axis's border at distance `leave`. At equal distances
+    /// the border of the higher axis comes first, as in [`nearest`]; `higher` says that this axis is the higher one.
     #[inline(always)]
     fn leap(&mut self, leave: f32, higher: bool) {
         if self.sign == 0 {
@@ -163,8 +163,8 @@ impl Axis {
         self.enter(if is_sure { position } else { self.place_beside(position, leave, higher) });
     }
 
-    /// [`Self::leap`] to a cell about `guess`: beside a border, a position is rounded otherwise than the distance to it, which
-    /// alone decides.
+    /// [`Self::leap`] to a cell near `guess`: beside a border, a position and the distance to the border round
+    /// differently, and the distance decides.
     #[cold]
     #[inline(never)]
     fn place_beside(self, guess: i32, leave: f32, higher: bool) -> i32 {
@@ -180,12 +180,12 @@ impl Axis {
     }
 }
 
-/// What rounding moves a position at most, for each cell along the axis: four times what the few roundings on the way to it,
-/// and to the distance of a border, can come to.
+/// Bound on the rounding error of a position, per cell along the axis: four times what the few roundings of a position
+/// and of the distance to a border can add up to.
 const ROUNDING: f32 = 4e-6;
 
 impl<'a, const LEAPS: bool> CellWalk<'a, LEAPS> {
-    // A shadow ray is often a few cells long: a call would cost some percent of it.
+    // A shadow ray is often only a few cells long: a call would cost it a few percent.
     #[inline(always)]
     fn new(grid: &'a MajorantGrid, track: &Track) -> Self {
         let per_cell = 1.0 / grid.edge;
@@ -199,7 +199,7 @@ impl<'a, const LEAPS: bool> CellWalk<'a, LEAPS> {
 impl<const LEAPS: bool> Iterator for CellWalk<'_, LEAPS> {
     type Item = CellStretch;
 
-    // Kernels over lanes must find it inside themselves.
+    // Must be inlined into SIMD kernels.
     #[inline(always)]
     fn next(&mut self) -> Option<CellStretch> {
         while self.start < self.length {
@@ -207,7 +207,7 @@ impl<const LEAPS: bool> Iterator for CellWalk<'_, LEAPS> {
             let (nx, ny) = (x.cells as isize, y.cells as isize);
             let cell =
                 (x.position as isize + nx * (y.position as isize + ny * z.position as isize)).cast_unsigned();
-            // Empty cells that follow on this one.
+            // Cells beyond this one that are surely empty.
             let ahead = if LEAPS { i32::from(self.grid.empty[cell].max(1)) - 1 } else { 0 };
             let (through, leave) = if ahead == 0 {
                 nearest([x.next, y.next, z.next])
@@ -217,7 +217,7 @@ impl<const LEAPS: bool> Iterator for CellWalk<'_, LEAPS> {
             let start = self.start;
             let end = leave.min(self.length);
             if end < self.length {
-                // Not indexed, so that all stays in registers.
+                // Not indexed by `through`, so that everything stays in registers.
                 for axis in 0..3 {
                     let along = &mut self.axes[axis];
                     if axis == through {
@@ -266,7 +266,7 @@ mod tests {
         MajorantGrid { dims: dims.map(|n| cast::fit_u32(n).cast_signed()), edge: 8.0, opacities, empty }
     }
 
-    /// From anywhere to anywhere, or through edges and corners of cells as nearly as rounding lets it.
+    /// Between random points, or through edges and corners of cells as nearly as rounding allows.
     fn track(random: &mut SplitMix, grid: &MajorantGrid) -> Track {
         let size = Vec3::new(grid.dims[0] as f32, grid.dims[1] as f32, grid.dims[2] as f32) * grid.edge;
         let corner = |p: Vec3| (p / grid.edge).round() * grid.edge;

@@ -1,8 +1,8 @@
 //! Marching: the midpoint rule on one grid of steps per track.
 //!
 //! Step `k` covers `[k step, (k + 1) step]`, the last one what is left. The grid does not depend on the transfer
-//! function, so skipping what is empty leaves every sample where it was and changes no bit. What skipping takes away is
-//! decided for each sample by the cell that it lies in.
+//! function, so skipping empty space leaves every other sample where it was and changes no bit. Whether a sample is
+//! skipped depends only on the cell that it is in.
 
 use super::march_notes::MarchNotes;
 use super::skip::Skip;
@@ -16,9 +16,9 @@ use fearless_simd::prelude::*;
 pub(super) struct Steps {
     /// Steps of full width.
     whole: i32,
-    /// All steps, with the last one that is not.
+    /// All steps, including the last, narrower one.
     count: i32,
-    /// Width of that one, world units.
+    /// Width of the last one, world units.
     rest: f32,
 }
 
@@ -26,11 +26,11 @@ impl Steps {
     pub(super) fn new(track: &Track, step: f32) -> Self {
         let whole = cast::truncate(track.length / step).min(i32::MAX - 1);
         let rest = (track.length - whole as f32 * step).max(0.0);
-        // A sliver of the last bit would be a step of no width.
+        // A remainder of rounding error would be a step of no width.
         Self { whole, count: whole + i32::from(rest > 1e-4 * step), rest }
     }
 
-    /// All of them.
+    /// All steps.
     pub(super) fn count(&self) -> i32 {
         self.count
     }
@@ -57,7 +57,7 @@ pub(crate) struct PacketSample<S: Lanes> {
 }
 
 impl Medium {
-    /// Optical thickness along a track by the midpoint rule with steps of `step` world units; stops where it passes
+    /// Optical thickness along a track by the midpoint rule with steps of `step` world units; stops once it exceeds
     /// `enough`.
     #[must_use]
     pub fn optical_thickness(&self, level: Level, track: &Track, step: f32, enough: f32) -> f32 {
@@ -82,7 +82,7 @@ impl Medium {
         let mut k = 0;
         for cell in self.majorants.walk(track) {
             if cell.most <= 0.0 {
-                // Up to the last step whose middle may lie in this cell; the loop below corrects it.
+                // Up to the last step whose midpoint may be in this cell; the loop below corrects it.
                 k = k.max(cast::truncate(cell.end / step - 0.5)).min(steps.count);
             }
             while k < steps.count && along.midpoint(k) < cell.end {
@@ -158,7 +158,7 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
         self.k
     }
 
-    /// Goes on with certain steps.
+    /// Continues at the given steps.
     #[inline(always)]
     pub fn go_to(&mut self, k: S::i32s) {
         self.k = k;
@@ -166,15 +166,15 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
         self.active = k.simd_lt(self.count);
     }
 
-    /// Goes on with certain steps up to others, not included, where each lane's track does not end before.
+    /// Continues at the given steps, up to `end` (exclusive) or the end of a lane's track if that comes first.
     #[inline(always)]
     pub fn go_between(&mut self, k: S::i32s, end: S::i32s) {
         self.count = self.count.min(end);
         self.go_to(k);
     }
 
-    /// The next samples of which one at least met matter; `notes` is told of all that is read. No lane's bits depend on what is in
-    /// the others.
+    /// The next samples, at least one of which met matter; everything read is reported to `notes`. No lane's bits
+    /// depend on what is in the others.
     #[inline(always)]
     pub fn next<N: MarchNotes<S>>(&mut self, notes: &mut N) -> Option<PacketSample<S>> {
         let simd = self.simd;
@@ -198,7 +198,7 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
                         continue;
                     }
                 } else {
-                    // Lanes that have ended stay where they are for ever.
+                    // Lanes that have ended do not limit the count.
                     let far = S::i32s::splat(simd, i32::MAX);
                     self.occupied = least(self.active.select(leap - k, far).as_slice()) - 1;
                 }
@@ -235,13 +235,13 @@ fn at<S: Lanes>(origin: [S::f32s; 3], direction: [S::f32s; 3], t: S::f32s) -> [S
 }
 
 impl Track {
-    /// Steps of a march along it.
+    /// Number of steps of a march along it.
     #[must_use]
     pub fn steps(&self, step: f32) -> i32 {
         Steps::new(self, step).count
     }
 
-    /// The same stretch, but for as much less than a step by which its steps begin later.
+    /// A track as long that begins later by `by`, less than a step, as do its steps.
     #[must_use]
     pub fn shifted(&self, by: f32) -> Self {
         Self {
@@ -298,7 +298,7 @@ impl<'a, S: Lanes> Along<'a, S> {
         self.count == S::WIDTH
     }
 
-    /// Takes the pending samples; gives the thickness so far.
+    /// Takes the pending samples; returns the thickness so far.
     #[inline(always)]
     fn take(&mut self) -> f32 {
         let simd = self.simd;

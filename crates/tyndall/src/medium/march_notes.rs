@@ -1,19 +1,19 @@
-//! What a march tells of all that it reads.
+//! What a march reports of everything that it reads.
 
 use crate::simd::Lanes;
 
-/// Listener to all that the lanes of a packet read.
+/// Listener to everything that the lanes of a packet read.
 pub(crate) trait MarchNotes<S: Lanes> {
-    /// Whether what is empty is crossed cell by cell, so that each is told.
+    /// Whether empty space is crossed cell by cell, so that each cell is reported.
     const EACH_CELL: bool;
 
     /// Values that some lanes read.
     fn values(&mut self, simd: S, lanes: S::mask32s, values: S::f32s);
 
-    /// Values that a lane reads about its sample.
+    /// Values that one lane reads around its sample.
     fn values_about(&mut self, simd: S, lane: usize, read: S::mask32s, values: S::f32s);
 
-    /// Numbers of the empty cells that some lanes leap over, x fastest.
+    /// Numbers of the empty cells that some lanes skip, x fastest.
     fn cells(&mut self, simd: S, lanes: S::mask32s, cells: S::u32s);
 }
 

@@ -1,25 +1,25 @@
-//! Free flight by inverting a march: the density of the distance that it draws is known, as methods need that weigh a collision
-//! again after the matter has changed.
+//! Free flight by inverting a march. The pdf of the sampled distance is known, as needed by methods that reweight a
+//! collision after the matter has changed.
 
 use super::march::Steps;
 use super::{Medium, Track};
 use crate::math::{Vec3, cast};
 
-/// A collision with the density at which its distance was drawn.
+/// A collision, with the pdf of its sampled distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MarchedCollision {
     /// World distance inside the medium, along the track.
     pub t: f32,
     /// Where, in index space.
     pub position: Vec3,
-    /// Extinction in the step of the march that the collision is in, per world unit.
+    /// Extinction in the march step that contains the collision, per world unit.
     pub sigma_t: f32,
     /// Optical depth up to the collision, by the march.
     pub optical_depth: f32,
 }
 
 impl MarchedCollision {
-    /// Density of the distance, per world unit: exactly that of [`Medium::marched_flight`], whatever its step.
+    /// Pdf of the distance, per world unit: exactly that of [`Medium::marched_flight`], whatever its step.
     #[must_use]
     pub fn pdf(&self) -> f32 {
         self.sigma_t * (-self.optical_depth).exp()
@@ -27,16 +27,16 @@ impl MarchedCollision {
 }
 
 impl Medium {
-    /// Flies through so much optical depth, or out of the medium (`None`), by a march with steps of `step` world units in each
-    /// of which extinction counts as that of its middle. For an exponentially distributed depth, distances have the density
-    /// that the collision tells; it is biased by the march, unlike [`Self::free_flight`], whose density is unknown.
+    /// Flies through an optical depth of `depth`, or out of the medium (`None`), by a march with steps of `step` world
+    /// units, each with the extinction of its midpoint. For an exponentially distributed depth, distances have the pdf
+    /// that the collision reports. The march makes it biased, unlike [`Self::free_flight`], whose pdf is unknown.
     #[must_use]
     pub fn marched_flight(&self, track: &Track, depth: f32, step: f32) -> Option<MarchedCollision> {
         let steps = Steps::new(track, step);
         let (mut k, mut met) = (0, 0.0);
         for cell in self.majorants.walk(track) {
             if cell.most <= 0.0 {
-                // Up to the last step whose middle may lie in this cell; the loop below corrects it.
+                // Up to the last step whose midpoint may be in this cell; the loop below corrects it.
                 k = k.max(cast::truncate(cell.end / step - 0.5)).min(steps.count());
             }
             while k < steps.count() && steps.midpoint(k, step) < cell.end {

@@ -50,7 +50,7 @@ pub struct Medium {
     volume: Arc<Volume>,
     transfer: Arc<TransferFunction>,
     majorants: Arc<MajorantGrid>,
-    /// As the settings have it.
+    /// As in the settings.
     cell_size: usize,
     clip: Clip,
     /// No track is longer: the diagonal of the box, world units.
@@ -95,14 +95,14 @@ impl Track {
 }
 
 impl Medium {
-    /// Looks at `volume` through `transfer`; builds the majorants, in parallel on the current pool.
+    /// `volume` seen through `transfer`; builds the majorants, in parallel on the current pool.
     #[must_use]
     pub fn new(volume: Arc<Volume>, transfer: Arc<TransferFunction>, settings: &MediumSettings) -> Self {
         Self::after(None, volume, transfer, settings)
     }
 
-    /// [`Self::new`], which shares the majorants of a medium before an edit that left them alone: of the very same volume and
-    /// function, and with cells of the same size.
+    /// [`Self::new`] that shares the majorants of the medium before an edit if they still hold: if volume and function
+    /// are the very same and the cells have the same size.
     #[must_use]
     pub fn after(
         before: Option<&Self>,

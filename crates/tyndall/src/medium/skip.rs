@@ -1,11 +1,11 @@
-//! How lanes leap over what is empty.
+//! Skipping of empty space.
 
 use super::Medium;
 use super::march_notes::MarchNotes;
 use crate::simd::Lanes;
 use fearless_simd::prelude::*;
 
-/// Leaping over what is empty, lane by lane.
+/// Skips empty space, lane by lane.
 pub(super) struct Skip<'a, S: Lanes> {
     simd: S,
     /// See [`MajorantGrid::empty`](super::MajorantGrid::empty).
@@ -15,7 +15,7 @@ pub(super) struct Skip<'a, S: Lanes> {
     step: f32,
     origin: [S::f32s; 3],
     inverse: [S::f32s; 3],
-    /// Infinite where a track never leaves along an axis, else 0.
+    /// Infinite where a track does not advance along the axis, so never leaves a cell there; else 0.
     never: [S::f32s; 3],
     forward: [S::mask32s; 3],
 }
@@ -23,9 +23,9 @@ pub(super) struct Skip<'a, S: Lanes> {
 /// The cells that the lanes are in.
 pub(super) struct LaneCells<S: Lanes> {
     position: [S::i32s; 3],
-    /// Whether there is no matter.
+    /// Whether they hold no matter.
     pub empty: S::mask32s,
-    /// Cells to where that ends; 0 where there is matter.
+    /// Cells until the empty region ends; 0 where there is matter.
     extent: S::i32s,
     pub number: S::u32s,
 }
@@ -74,7 +74,8 @@ impl<'a, S: Lanes> Skip<'a, S> {
         cell.min(S::i32s::splat(self.simd, self.dims[axis] - 1))
     }
 
-    /// The last step whose middle surely lies where all is alike, empty or full of matter; or the next.
+    /// The last step whose midpoint is surely in the same empty region or in the same cell with matter; at least the
+    /// next step.
     #[inline(always)]
     pub fn leap(&self, k: S::i32s, cells: &LaneCells<S>) -> S::i32s {
         let one = S::i32s::splat(self.simd, 1);
@@ -87,7 +88,7 @@ impl<'a, S: Lanes> Skip<'a, S> {
         last.max(k + 1)
     }
 
-    /// Where the tracks leave what is alike along an axis.
+    /// Where the tracks leave that region or cell along an axis.
     #[inline(always)]
     fn leave(&self, a: usize, cells: &LaneCells<S>, extent: S::i32s) -> S::f32s {
         let border = cells.position[a] + self.forward[a].select(extent, -(extent - 1));

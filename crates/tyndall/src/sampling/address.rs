@@ -1,8 +1,9 @@
-//! Where the random numbers of a picture lie: the one table of what they are for, with the key and the counter \[Salmon11\] of each.
+//! Addresses of a picture's random numbers: the one table of what they are for, with the key and the counter
+//! \[Salmon11\] of each.
 //!
-//! Under a seed, five words tell numbers apart: the pass, which goes into the key, and the four words of the counter. The first of
-//! these counts the blocks of a [`Stream`], without end; what is drawn once may give it a meaning. The last begins with the
-//! [`Kind`] of the purpose, which keeps any two purposes apart; the tests below hold them to that.
+//! Under one seed, five words identify a number: the pass, which goes into the key, and the four words of the counter.
+//! The first of these counts the blocks of a [`Stream`], without bound; a purpose that draws once may give it another
+//! meaning. The last begins with the [`Kind`] of the purpose, so that no two purposes overlap; the tests below check it.
 
 use super::philox;
 use super::stream::{Stream, key};
@@ -11,27 +12,27 @@ use std::ops::RangeInclusive;
 /// Bounces that draw from the Sobol sequence; past these a better spread no longer pays.
 pub(super) const SOBOL_BOUNCES: u32 = 12;
 
-/// Points of a Sobol sequence before it is scrambled anew.
+/// Points of a Sobol sequence before the next one, with its own scramble.
 pub(super) const SEQUENCE: u32 = 1 << 16;
 
-/// Of samples, passes and emitters: no word is ruled out.
+/// Samples, passes and emitters: any word is possible.
 const ANY: RangeInclusive<u32> = 0..=u32::MAX;
-/// Row by row; a document has no more.
+/// Pixels, row by row; a document has no more.
 pub const PIXELS: RangeInclusive<u32> = 0..=(1 << 28) - 1;
-/// Of one emitter in one pass; a document has no more.
+/// Paths of one emitter in one pass; a document has no more.
 pub const PATHS: RangeInclusive<u32> = 0..=(1 << 28) - 1;
-/// From 0; a document has no more.
+/// Bounces, from 0; a document has no more.
 pub const BOUNCES: RangeInclusive<u32> = 0..=999_999;
-/// Those past the Sobol sequence.
+/// Bounces past the Sobol sequence.
 const LATE_BOUNCES: RangeInclusive<u32> = SOBOL_BOUNCES..=*BOUNCES.end();
-/// Sobol sequences, one after the other, of a pixel's samples and of an emitter's paths.
+/// Numbers of successive Sobol sequences, of a pixel's samples and of an emitter's paths.
 const SEQUENCES_OF_SAMPLES: RangeInclusive<u32> = 0..=*ANY.end() / SEQUENCE;
 const SEQUENCES_OF_PATHS: RangeInclusive<u32> = 0..=*PATHS.end() / SEQUENCE;
 
-/// No index of a light reaches it.
+/// Above every index of a light.
 const TOP_BIT: u32 = 1 << 31;
 
-/// What numbers are for, in the upper bits of the counter's last word.
+/// The purpose of numbers, in the upper four bits of the counter's last word.
 #[derive(Clone, Copy, Debug)]
 enum Kind {
     CameraTracking,
@@ -50,7 +51,8 @@ impl Kind {
     }
 }
 
-/// Each row: a variant, the values that its fields may have, and the words that follow from them. Each word shall grow with one field.
+/// Each row: a variant, the values that its fields may have, and the words computed from them. Each word must increase
+/// with one field.
 macro_rules! table {
     ($(#[$about:meta])* $table:ident.$words:ident -> $of:ty {
         $($(#[$doc:meta])* $name:ident $({ $($field:ident in $range:expr),* })? => $word:expr;)*
@@ -97,7 +99,7 @@ table! {
         /// Scramble of the Sobol sequence of camera paths.
         CameraScramble { pixel in PIXELS, sequence in SEQUENCES_OF_SAMPLES } =>
             once(0, [pixel, sequence, 0, Kind::CameraScramble.at(0)]);
-        /// A view ray of a refinement pass: its place in the pixel, on the lens, and its steps.
+        /// A view ray of a refinement pass: its position in the pixel and on the lens, and its steps.
         ViewRay { pixel in PIXELS, sample in ANY } =>
             stream(0, [pixel, sample, Kind::ViewRay.at(0)]);
         /// Scramble of the Sobol sequence of light paths.
@@ -106,7 +108,8 @@ table! {
         /// Tracking of a flight of a light path.
         LightTracking { pass in ANY, emitter in ANY, path in PATHS, bounce in BOUNCES } =>
             stream(pass, [emitter, path, Kind::LightTracking.at(bounce)]);
-        /// A scattering of a light path past the Sobol sequence: apart from the flight's numbers, whose count is not known.
+        /// A scattering event of a light path past the Sobol sequence: apart from the flight's numbers, whose count is
+        /// unknown.
         LightLateBounce { pass in ANY, emitter in ANY, path in PATHS, bounce in LATE_BOUNCES } =>
             stream(pass, [emitter, path, Kind::LightLateBounce.at(bounce)]);
         /// Where in a glowing cell a light path begins.
@@ -116,9 +119,9 @@ table! {
 }
 
 table! {
-    /// What sends light paths, and the word that tells its random numbers from those of others.
+    /// Emitters of light paths, each with the word that separates its random numbers from those of the others.
     Emitter.number -> u32 {
-        /// A light without a name of its own: by its place among the lights.
+        /// A light without a name of its own: by its index among the lights.
         Unnamed { index in 0..=TOP_BIT - 2 } => index;
         /// A light with a name: by a hash, so that it keeps its numbers when other lights come and go. One pair of names in
         /// 2^31 shares them.
@@ -128,12 +131,12 @@ table! {
     }
 }
 
-/// Where numbers lie under a seed.
+/// Address of random numbers under a seed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Address {
     pass: u32,
     counter: [u32; 4],
-    /// Whether the counter's first word goes on from there.
+    /// Whether the counter's first word counts up from there.
     is_stream: bool,
 }
 
@@ -146,7 +149,7 @@ const fn stream(pass: u32, [a, b, c]: [u32; 3]) -> Address {
 }
 
 impl Purpose {
-    /// The numbers of a purpose that draws any count of them.
+    /// The numbers of a purpose that may draw any number of them.
     #[inline]
     pub fn stream(self, seed: u64) -> Stream {
         let Address { pass, counter, is_stream } = self.address();

@@ -7,12 +7,12 @@ pub struct Discrete {
     cumulative: Vec<f64>,
 }
 
-/// One of several, chosen.
+/// The outcome of a choice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
-    /// Which.
+    /// Index of the chosen one.
     pub index: usize,
-    /// How likely it was.
+    /// Its probability.
     pub probability: f32,
     /// A fresh uniform number in [0, 1), left over from the choice.
     pub leftover: f32,

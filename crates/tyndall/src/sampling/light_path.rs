@@ -1,5 +1,5 @@
-//! The numbers of one light path: each follows from seed, pass, light, path, bounce and dimension alone, so that a path that
-//! is traced again, from its beginning or from any scattering on, draws the same.
+//! The random numbers of one light path: each depends only on seed, pass, light, path, bounce and dimension, so that a
+//! path retraced from its start or from any scattering event draws the same numbers.
 
 use super::Stream;
 use super::address::{Purpose, SEQUENCE, SOBOL_BOUNCES};
@@ -24,7 +24,7 @@ impl LightPathSampler {
         Self { seed, pass, emitter, path, scramble }
     }
 
-    /// Paths among which the numbers of one dimension are spread evenly.
+    /// Number of successive paths over which each dimension is stratified.
     pub const STRATIFIED: u32 = SEQUENCE;
 
     /// The four numbers that decide where and in which direction the path starts.

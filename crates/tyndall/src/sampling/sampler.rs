@@ -8,7 +8,7 @@ use sobol_burley::sample_4d;
 /// The numbers of one scattering event, each in [0, 1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BounceSample {
-    /// How far the flight that leads here goes; see [`Self::flight_depth`].
+    /// Length of the flight that leads here; see [`Self::flight_depth`].
     pub flight: f32,
     /// Which light.
     pub light_choice: f32,

@@ -3,7 +3,7 @@
 use super::philox;
 use crate::math::cast;
 
-/// Uniform numbers of one address under a seed; two streams with different addresses never meet.
+/// Uniform numbers of one address under a seed; two streams with different addresses never overlap.
 #[derive(Clone, Debug)]
 pub struct Stream {
     pub(super) key: [u32; 2],
@@ -14,7 +14,8 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// The stream of `[a, b, c]` under a seed: for numbers beside a picture. Those in it may have the same address.
+    /// The stream of `[a, b, c]` under a seed, for numbers outside a picture; those of a picture may have the same
+    /// address.
     #[must_use]
     pub fn new(seed: u64, [a, b, c]: [u32; 3]) -> Self {
         Self::at(key(seed, 0), [0, a, b, c])
@@ -50,7 +51,8 @@ impl Stream {
     }
 }
 
-/// The golden ratio spreads passes over all seeds; it is odd, so that no two passes share a key. The first has the seed itself.
+/// The golden ratio spreads passes over all seeds; it is odd, so that no two passes share a key. The first pass uses
+/// the seed itself.
 #[inline]
 pub(super) fn key(seed: u64, pass: u32) -> [u32; 2] {
     let seed = seed.wrapping_add(u64::from(pass).wrapping_mul(0x9E37_79B9_7F4A_7C15));

@@ -1,5 +1,5 @@
-//! The scattering function of a volume: a phase function where the data are even, more and more a
-//! BRDF where they have an edge.
+//! The scattering function of a volume: a phase function where the data are homogeneous, blended into a
+//! BRDF towards edges.
 //!
 //! Per unit extinction `sigma_s s / sigma_t = (1-q) albedo phase + q f_r(w_in, w_out) |n . w_in|`.
 //! The cosine belongs to the side where the light comes from, whichever way the walk goes, so with
@@ -8,7 +8,7 @@
 use super::{Brdf, Phase, Surface, TransportMode};
 use crate::math::{Rgb, Vec3};
 
-/// How far a point scatters as a surface: `surface (1 - exp(-gradient_factor |grad v| h / range))`.
+/// Share of surface scattering at a point: `surface (1 - exp(-gradient_factor |grad v| h / range))`.
 ///
 /// `surface` in [0, 1] from the transfer function; `gradient_length` in data values per world unit;
 /// `voxel_size` the cube root of the voxel volume, in world units; `robust_range` in data values.
@@ -28,22 +28,22 @@ pub fn surface_share(
     -surface * (-gradient_factor * gradient_length * voxel_size / robust_range).exp_m1()
 }
 
-/// All that decides how light scatters at one point.
+/// Everything that determines how light scatters at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
-    /// Of the matter.
+    /// Phase function of the matter.
     pub phase: Phase,
-    /// Of its surfaces.
+    /// BRDF of its surfaces.
     pub brdf: Brdf,
     /// Local optics; `albedo` serves both.
     pub surface: Surface,
-    /// Unit gradient of the data, either way; `None` where it vanishes, which makes `q` count as 0.
+    /// Unit gradient of the data, of either sign; `None` where it vanishes, which makes `q` count as 0.
     pub normal: Option<Vec3>,
     /// Share of the surface, in [0, 1]; see [`surface_share`].
     pub q: f32,
 }
 
-/// A drawn direction.
+/// A sampled direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Unit vector that leaves the point: `w_in` of a camera path, `w_out` of a light path. The walk's
@@ -68,7 +68,7 @@ impl Event {
         matter + self.brdf.eval(normal, w_in, w_out, &self.surface) * (q * normal.dot(w_in).abs())
     }
 
-    /// In a camera path: draws where the light comes from. `None` is light that was lost, a weight of 0.
+    /// In a camera path: samples where the light comes from. `None` is lost light, a weight of 0.
     ///
     /// `u` are uniform numbers in [0, 1); the last one chooses the lobe.
     #[inline]
@@ -78,14 +78,14 @@ impl Event {
         Some(Sample { direction, weight: self.eval(w_out, direction) / pdf, pdf })
     }
 
-    /// Density with which [`Self::sample`] draws `w_in`, \[1/sr\]; falls short of 1 by the chance of `None`.
+    /// Density with which [`Self::sample`] samples `w_in`, \[1/sr\]; integrates to 1 less the probability of `None`.
     #[inline]
     #[must_use]
     pub fn pdf(&self, w_out: Vec3, w_in: Vec3) -> f32 {
         self.density(TransportMode::Camera, w_out, w_in)
     }
 
-    /// In a light path: draws where the light goes. The weight keeps `|n . w_in|`, though `w_out` is drawn.
+    /// In a light path: samples where the light goes. The weight keeps `|n . w_in|`, though `w_out` is sampled.
     ///
     /// `u` are uniform numbers in [0, 1); the last one chooses the lobe.
     #[inline]
@@ -95,7 +95,7 @@ impl Event {
         Some(Sample { direction, weight: self.eval(direction, w_in) / pdf, pdf })
     }
 
-    /// Density with which [`Self::sample_adjoint`] draws `w_out`, \[1/sr\].
+    /// Density with which [`Self::sample_adjoint`] samples `w_out`, \[1/sr\].
     #[inline]
     #[must_use]
     pub fn pdf_adjoint(&self, w_in: Vec3, w_out: Vec3) -> f32 {
@@ -108,7 +108,7 @@ impl Event {
         let direction = if u[2] < on_surface {
             self.brdf.sample(walk, normal, known, &self.surface, [u[0], u[1], u[2] / on_surface])?
         } else {
-            // Phase functions are the same reversed, so both walks turn the way they travel, -known.
+            // Phase functions are symmetric, so both walks scatter from their direction of travel, -known.
             self.phase.sample(-known, [u[0], u[1]])
         };
         let pdf = self.density(walk, known, direction);
@@ -127,8 +127,8 @@ impl Event {
         matter + on_surface * self.brdf.pdf(walk, normal, known, drawn, &self.surface)
     }
 
-    /// Chance of drawing by the BRDF: its share of what is scattered, so that weights stay bounded.
-    /// `None` if nothing is.
+    /// Probability of sampling the BRDF: its share of what is scattered, so that weights stay bounded.
+    /// `None` if nothing is scattered.
     #[inline]
     fn surface_chance(&self, walk: TransportMode, known: Vec3) -> Option<f32> {
         let (normal, q) = self.side();
@@ -141,14 +141,14 @@ impl Event {
         (matter + surface > 0.0).then(|| surface / (matter + surface))
     }
 
-    /// Whether a surface has a share in it.
+    /// Whether a surface contributes.
     #[inline]
     #[must_use]
     pub fn is_surface(&self) -> bool {
         self.side().1 > 0.0
     }
 
-    /// The normal and the share of the surface; without a normal, none.
+    /// The normal and the share of the surface, which is 0 without a normal.
     #[inline]
     fn side(&self) -> (Vec3, f32) {
         self.normal.map_or((Vec3::Z, 0.0), |normal| (normal, self.q))
@@ -166,7 +166,7 @@ mod tests {
     /// Share by which the quadrature may be off where the horizon cuts through its cells.
     const QUADRATURE_ERROR: f64 = 1e-4;
 
-    /// Mixes of every phase function and BRDF, q drawn at random; `normal` as given.
+    /// Mixes of every phase function and BRDF with random q and the given `normal`.
     fn mixes(normal: Vec3) -> Vec<Event> {
         let mut random = SplitMix::new(17);
         let phases = [
@@ -252,7 +252,7 @@ mod tests {
         };
         for (i, event) in mixes(normal()).into_iter().enumerate() {
             let degrees = [0.0_f32, 50.0, 86.0][i % 3];
-            // The mirror direction is the pole of the cells, which finds lobes however narrow.
+            // The mirror direction is the pole of the cells, which resolves lobes however narrow.
             let n = deflect(Vec3::Z, 1.0 - degrees.to_radians().cos(), 0.1);
             let known = n * (2.0 * n.z) - Vec3::Z;
             let event = Event { normal: Some(n), ..event };
@@ -269,7 +269,7 @@ mod tests {
         }
     }
 
-    /// The mean weight is the integral of `eval` over the drawn direction, the cosine of `w_in` in both walks.
+    /// The mean weight is the integral of `eval` over the sampled direction, with the cosine of `w_in` in both walks.
     #[test]
     fn weights_average_to_the_integral() {
         let mut random = SplitMix::new(3);

@@ -4,11 +4,11 @@
 //! **Directions.** A phase function takes directions that *follow the light*: `w` is how it travels
 //! before and `w'` how it travels after, and `cos_theta = w . w' = +1` means that it went straight on.
 //! BRDFs and the mix take the two directions that *leave the point*: `w_in` points to where the light
-//! comes from and `w_out` to where it goes. They are tied by `w = -w_in` and `w' = w_out`, so that
+//! comes from and `w_out` to where it goes. They are related by `w = -w_in` and `w' = w_out`, so that
 //! `cos_theta = -(w_in . w_out)`.
 //!
-//! A walk from the camera along `d` knows `w_out = -d` and draws `w_in`, its next direction; a walk
-//! from a light along `d` knows `w_in = -d` and draws `w_out`, its next direction. See [`TransportMode`].
+//! A walk from the camera along `d` knows `w_out = -d` and samples `w_in`, its next direction; a walk
+//! from a light along `d` knows `w_in = -d` and samples `w_out`, its next direction. See [`TransportMode`].
 
 pub mod brdf;
 pub mod mix;
@@ -23,18 +23,18 @@ pub use phase::{HenyeyGreenstein, Phase, PhaseError, Schlick};
 use crate::math::{Frame, Vec3};
 use std::f32::consts::TAU;
 
-/// Where a walk began, and so which of the two directions at a scattering it knows.
+/// Where a walk began, and thus which of the two directions at a scattering event it knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TransportMode {
-    /// From the camera, against the light: knows `w_out`, draws `w_in`.
+    /// From the camera, against the light: knows `w_out`, samples `w_in`.
     Camera,
-    /// From a light, with the light: knows `w_in`, draws `w_out`.
+    /// From a light, with the light: knows `w_in`, samples `w_out`.
     Light,
 }
 
 /// The unit vector at an angle with `1 - cos = drop` from `axis` and `turn` turns about it.
 ///
-/// Narrow lobes need the small difference: in single precision a cosine near 1 has lost it.
+/// Narrow lobes need this small difference, which a single-precision cosine near 1 has lost.
 #[inline]
 fn deflect(axis: Vec3, drop: f32, turn: f32) -> Vec3 {
     let sin_theta = (drop * (2.0 - drop)).max(0.0).sqrt();
@@ -51,7 +51,7 @@ mod tests {
     use crate::math::Rgb;
     use tyndall_testing::SplitMix;
 
-    /// The convention of the whole room: positive g goes on the way the light went.
+    /// The convention of the whole module: positive g scatters forward, the way the light travels.
     #[test]
     fn positive_g_goes_forward() {
         let phase = Phase::HenyeyGreenstein(HenyeyGreenstein::new(0.95).unwrap());

@@ -1,13 +1,13 @@
-//! What the tests of this room share: quadrature over directions and ready-made surfaces.
+//! What the tests of this module share: quadrature over directions and ready-made surfaces.
 
 use super::{Surface, deflect};
 use crate::math::{Rgb, Vec3, cast};
 use std::f64::consts::PI;
 
-/// Integrals of `f` over all directions, on a grid that is dense about `pole` and even far from it.
+/// Integrals of `f` over all directions, on a grid that is dense about `pole` and coarser away from it.
 ///
-/// Polar angles grow like the third power, so a lobe of a thousandth of a radian about the pole still
-/// spans tens of rows.
+/// Polar angles grow with the third power of the row, so a lobe of a thousandth of a radian about the pole
+/// still spans tens of rows.
 pub fn integrate<const N: usize>(pole: Vec3, f: impl Fn(Vec3) -> [f64; N]) -> [f64; N] {
     const ROWS: i32 = 500;
     const COLUMNS: i32 = 256;
@@ -28,7 +28,7 @@ pub fn integrate<const N: usize>(pole: Vec3, f: impl Fn(Vec3) -> [f64; N]) -> [f
     sums
 }
 
-/// Unit normal that is no axis.
+/// A unit normal that is not an axis.
 pub fn normal() -> Vec3 {
     Vec3::new(0.36, -0.48, 0.8)
 }
@@ -43,7 +43,7 @@ pub fn mirrored(w: Vec3) -> Vec3 {
     (normal() * (2.0 * w.dot(normal())) - w).normalize()
 }
 
-/// Equal in all channels.
+/// A surface equal in all channels.
 pub fn grey(albedo: f32, specular: f32, roughness: f32) -> Surface {
     Surface { albedo: Rgb::splat(albedo), specular: Rgb::splat(specular), roughness }
 }

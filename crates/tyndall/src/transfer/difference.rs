@@ -1,9 +1,9 @@
 //! What an edit of the transfer function changed: the values that now mean other optics.
 //!
-//! Compared is what rendering reads, not the list of points: the pairs of points between which a value lies, both clamped
-//! ends included, and the rows of the tables, which may round otherwise where a value's own pair is as it was: beside a point
-//! that came into the bin, or where emission bends by more or less of the brightest. A point that moves nothing but the
-//! rounding of its neighbourhood counts as a change there, since pictures are compared bit for bit.
+//! What is compared is what rendering reads, not the list of points: the pairs of points that enclose a value, both
+//! clamped ends included, and the rows of the tables. A table may round differently even where a value's own pair is
+//! unchanged: beside a point added to the bin, or where the bend of emission relative to the brightest has changed. A
+//! point that changes only the rounding near it counts as a change there, since pictures are compared bit for bit.
 
 use super::glow::GlowTable;
 use super::{Optics, Point, TransferFunction};
@@ -42,7 +42,7 @@ impl BinSet {
         self.words.get(bin / 64).is_some_and(|word| word >> (bin % 64) & 1 == 1)
     }
 
-    /// Whether no bin is.
+    /// Whether no bin is in the set.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.words.iter().all(|&word| word == 0)
@@ -54,12 +54,12 @@ impl BinSet {
     }
 }
 
-/// Per group of optics the bins in which they changed; what reads none of them is as it was.
+/// Per group of optics the bins in which they changed; whatever reads none of these bins is unchanged.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TransferDifference {
-    /// Opacity: what light meets on its way.
+    /// Opacity: how light is attenuated.
     pub opacity: BinSet,
-    /// Albedo, share and look of surfaces: how light scatters.
+    /// Albedo, and the share and optics of surfaces: how light scatters.
     pub scattering: BinSet,
     /// Emission, or the albedo of what glows: which matter is a light.
     pub emission: BinSet,
@@ -68,7 +68,7 @@ pub struct TransferDifference {
 }
 
 impl TransferDifference {
-    /// Between two functions in the same bins; with other bins all is changed.
+    /// Between two functions over the same bins; if the bins differ, everything is changed.
     #[must_use]
     pub fn between(old: &TransferFunction, new: &TransferFunction) -> Self {
         if old.bins() != new.bins() {
@@ -122,10 +122,10 @@ fn interpolated<const N: usize>(
     changed(old, new, |old, new| !agree(old, new, &quantities))
 }
 
-/// The two points between which a value lies; twice the same beyond the ends.
+/// The two points that enclose a value; the same one twice beyond the ends.
 type Segment<'a> = (&'a Point, &'a Point);
 
-/// Whether quantities are the same all over two segments: the same ends at the same values, or constant.
+/// Whether quantities are the same throughout two segments: the same ends at the same values, or constant.
 fn agree<const N: usize>(old: Segment, new: Segment, quantities: impl Fn(&Optics) -> [f32; N]) -> bool {
     let ends = |(a, b): Segment| [quantities(&a.optics), quantities(&b.optics)].map(|q| q.map(f32::to_bits));
     let values = |(a, b): Segment| [a.value, b.value];
@@ -133,7 +133,7 @@ fn agree<const N: usize>(old: Segment, new: Segment, quantities: impl Fn(&Optics
     ends(new) == [start, end] && (start == end || values(old) == values(new))
 }
 
-/// The bins that values lie in whose segments differ.
+/// The bins of all values whose segments differ.
 fn changed(
     old: &TransferFunction,
     new: &TransferFunction,
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_say_nothing_change_nothing() {
+    fn redundant_points_change_nothing() {
         let before = function(&[point(0.0, 0.0), point(100.0, 0.5), point(900.0, 0.5)]);
         let more = function(&[point(0.0, 0.0), point(100.0, 0.5), point(300.0, 0.5), point(900.0, 0.5)]);
         let longer = function(&[point(0.0, 0.0), point(100.0, 0.5), point(1e6, 0.5)]);
@@ -242,7 +242,7 @@ mod tests {
         assert_eq!(difference.opacity.iter().count(), ValueBins::COUNT);
     }
 
-    /// What the sets promise: where a bin is not in them, no value of it has a single other bit.
+    /// What the sets promise: in a bin that is not in them, no bit changes at any value.
     #[test]
     fn outside_the_sets_all_bits_are_the_same() {
         let mut random = SplitMix::new(41);
@@ -276,11 +276,11 @@ mod tests {
                 0 => edited[which].optics.opacity = uniform(),
                 1 => edited[which].optics.albedo.r = uniform(),
                 2 => edited[which].value += if which + 1 == count { 50.0 } else { 0.0 },
-                // Brighter by far, so that all else may bend more.
+                // Much brighter, so that all else may bend more.
                 3 => edited[count - 1].optics.emission = Rgb::splat(1e4 * uniform()),
                 // Just above a jump, or not.
                 4 => edited[(which + 1).min(count - 1)].optics.emission.r += 1e-5,
-                // Two close points, of which the second may say nothing.
+                // Two close points, the second of which may be redundant.
                 5 => {
                     let next = edited.get(which + 1).map_or(2000.0, |p| p.value);
                     let value = (edited[which].value + 0.3 * uniform()).min(next);
@@ -290,7 +290,7 @@ mod tests {
             }
             let [before, after] =
                 [points, edited].map(|points| TransferFunction::over(ValueBins::new([0.0, 1024.0]), points));
-            // A point may have come between the two of a jump.
+            // A point may have been inserted between the two of a jump.
             let (Ok(before), Ok(after)) = (before, after) else { continue };
             let difference = TransferDifference::between(&before, &after);
             let across = (0..11_000_u16).map(|i| f32::from(i) * 0.1 - 30.0);

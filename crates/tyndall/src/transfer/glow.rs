@@ -1,4 +1,4 @@
-//! What matter emits as lines in bins, for marching, which reads it at every sample.
+//! Emission of matter as one line per bin, for marching, which reads it at every sample.
 
 use super::{Optics, Point};
 use crate::math::{Rgb, cast};
@@ -6,16 +6,16 @@ use crate::volume::ValueBins;
 
 /// Per bin the emission at its lower end and its rise over the bin, `(1 - albedo) Le` by channel.
 ///
-/// The product of two lines is no line: a bin in which it bends by more than a ten-thousandth, and one that a point
-/// divides, sends to the function.
+/// The product of two lines is not a line: for a bin in which it bends by more than a ten-thousandth, and for one that
+/// a point divides, the function itself is evaluated.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct GlowTable {
     bins: ValueBins,
-    /// NaN where the function itself is to be asked.
+    /// NaN where the function itself must be evaluated.
     rows: Vec<[f32; 6]>,
 }
 
-/// Deviation from the line, relative to the brightest emission, that does not show.
+/// Largest deviation from the line, relative to the brightest emission, that is not visible.
 const BEND: f32 = 1e-4;
 
 impl GlowTable {
@@ -44,8 +44,9 @@ impl GlowTable {
         Self { bins, rows }
     }
 
-    /// Whether look-ups in a bin read other bits than those of another table in the same bins. No table is one of black; so is a
-    /// function that is asked where a line is black, unless the function differs.
+    /// Whether look-ups in a bin differ in any bit between two tables over the same bins. A missing table counts as
+    /// black. A row that defers to the function counts as equal to a black one: a change of the function shows in its
+    /// points.
     pub(super) fn differs(old: Option<&Self>, new: Option<&Self>, bin: usize) -> bool {
         let row = |table: Option<&Self>| table.map_or([0.0; 6], |table| table.rows[bin]);
         let (old, new) = (row(old), row(new));
@@ -53,7 +54,7 @@ impl GlowTable {
         old.map(f32::to_bits) != new.map(f32::to_bits) && !(black_or_asked(&old) && black_or_asked(&new))
     }
 
-    /// What matter of a value emits; `None` where the function is to be asked.
+    /// What matter of a value emits; `None` where the function must be evaluated.
     #[inline]
     pub(super) fn emitted(&self, value: f32) -> Option<Rgb> {
         let position = self.bins.position(value);
@@ -80,8 +81,8 @@ mod tests {
             },
         };
         let smooth = vec![point(0.0, 0.0, 0.0), point(1024.0, 1.0, 5.0)];
-        // Jumps in the middle and at the border of a bin, a bend too strong for a line, and a spike beside the values
-        // where a line is tried.
+        // Jumps in the middle and at the border of a bin, a bend too strong for a line, and a spike between the values
+        // at which a line is tested.
         let rough = vec![
             point(0.0, 0.9, 0.1),
             point(99.5, 0.9, 0.1),
@@ -101,7 +102,7 @@ mod tests {
             for i in 0..21_000_u16 {
                 let value = f32::from(i) * 0.05 - 10.0;
                 let (found, exact) = (function.emitted(value).r, function.optics(value).emitted().r);
-                // A bend and the rounding of a position, 2^-14 of a bin, over which emission may rise by a third.
+                // A bend, and the rounding of a position by 2^-14 of a bin, across which emission may rise by a third.
                 assert!((found - exact).abs() < 1.5e-4 * 5.0, "{found}, exactly {exact} at {value}");
                 from_table += usize::from(function.glow.as_ref().unwrap().emitted(value).is_some());
             }

@@ -1,8 +1,8 @@
 //! Historygrams \[Jonsson12, sec. 4.2\]: which data values a computation has read, as a set of groups of values.
 //!
-//! An edit of the transfer function is a set of values too; what has read none of them need not be computed again. Groups
-//! are made of whole [`ValueBins`], which the tables of optics are kept in, and follow from the data alone, so that no
-//! edit moves them.
+//! An edit of the transfer function is a set of values too; what has read none of them need not be recomputed. Groups
+//! consist of whole [`ValueBins`], the bins of the tables of optics, and depend on the data alone, so that no
+//! edit changes them.
 
 use super::BinSet;
 use crate::math::cast;
@@ -17,10 +17,10 @@ impl Historygram {
     /// Nothing.
     pub const EMPTY: Self = Self(0);
 
-    /// Every group that there can be.
+    /// Every possible group.
     pub const ALL: Self = Self(u128::MAX);
 
-    /// Whether nothing is in it.
+    /// Whether it holds no group.
     #[inline]
     #[must_use]
     pub fn is_empty(self) -> bool {
@@ -78,10 +78,10 @@ impl BitAnd for Historygram {
 /// How data values are put into groups.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Grouping {
-    /// Groups that hold equally many voxels, as far as whole bins allow.
+    /// Groups with equally many voxels, as far as whole bins allow.
     #[default]
     Quantile,
-    /// Groups equally wide, as in \[Jonsson12, eq. 11\] but that the last is as wide as the others.
+    /// Groups of equal width, as in \[Jonsson12, eq. 11\], except that the last is as wide as the others.
     Uniform,
 }
 
@@ -97,7 +97,7 @@ impl HistoryGroups {
     /// `count` groups, 1 to 128, of a volume's value bins.
     ///
     /// # Panics
-    /// If `count` is none of these.
+    /// If `count` is outside 1 to 128.
     #[must_use]
     pub fn new(volume: &Volume, count: u8, grouping: Grouping) -> Self {
         assert!((1..=128).contains(&count), "{count} groups: a Historygram has 1 to 128");
@@ -123,22 +123,22 @@ impl HistoryGroups {
         &self.groups
     }
 
-    /// What reading a value of a bin leaves in a history.
+    /// What reading a value in a bin records in a history.
     #[inline]
     #[must_use]
     pub fn of(&self, bin: usize) -> Historygram {
         Historygram(1 << self.groups[bin])
     }
 
-    /// What reading values from `first` to `last` leaves in a history, both in bins.
+    /// What reading values from bin `first` to bin `last` records in a history.
     #[must_use]
     pub fn between(&self, first: usize, last: usize) -> Historygram {
-        // Groups ascend with the bins, so that all between the ends are met.
+        // Groups ascend with the bins, so all groups between the ends are included.
         let [first, last] = [first, last].map(|bin| u32::from(self.groups[bin]));
         Historygram(u128::MAX >> (127 - last) & u128::MAX << first)
     }
 
-    /// The Historygram of changed bins, which histories are asked for \[Jonsson12, sec. 4.2\].
+    /// The Historygram of changed bins, against which histories are tested \[Jonsson12, sec. 4.2\].
     #[must_use]
     pub fn query(&self, changed: &BinSet) -> Historygram {
         changed.iter().fold(Historygram::EMPTY, |query, bin| query | self.of(bin))
@@ -149,8 +149,8 @@ fn group(x: f32) -> u8 {
     u8::try_from(cast::index(x)).expect("a group's number")
 }
 
-/// Cuts bins, given their counts without the two outer ones, into groups that hold equally many. What fills a group alone
-/// takes its share from it, and the rest is cut anew. Few values have a group each.
+/// Cuts bins into groups of equal counts, given the counts of all bins but the two outer ones. A bin that fills a group
+/// by itself is removed from the total, and the rest is divided again. If there are few values, each has its own group.
 fn equal_counts(inside: &[u64], count: u8) -> Vec<u8> {
     let values = inside.iter().filter(|&&n| n > 0).count();
     if 2 * values < usize::from(count) {
@@ -163,7 +163,7 @@ fn equal_counts(inside: &[u64], count: u8) -> Vec<u8> {
     for &n in inside {
         let groups_left = u64::from(count - group);
         let wanted = left.div_ceil(groups_left);
-        // A new group where this one is full, or would overflow by more than it lacks.
+        // A new group where this one is full, or would overshoot by more than it now falls short.
         let full = held > 0 && n > 0 && held + n / 2 >= wanted;
         if full && groups_left > 1 {
             group += 1;
@@ -177,8 +177,8 @@ fn equal_counts(inside: &[u64], count: u8) -> Vec<u8> {
     groups
 }
 
-/// A group for each bin that is not empty, and for what lies between two of them: materials are often told apart half-way
-/// between their values, so that an edit of one reaches to there.
+/// A group for each bin that is not empty, and for the bins between two of them: materials are often separated halfway
+/// between their values, so an edit of one extends that far.
 fn each_value(inside: &[u64]) -> Vec<u8> {
     let (mut group, mut held) = (0, 0);
     let mut groups = vec![0];
@@ -235,7 +235,7 @@ mod tests {
         let of = [0, 5, 6, 7, 300, 301, 302, 303, 1023, 1024, 1025].map(|bin| groups[bin]);
         assert_eq!(of, [0, 0, 1, 2, 2, 3, 4, 5, 5, 6, 7]);
         assert!(groups.is_sorted());
-        // One group less than these need: cut as if they were many.
+        // One group fewer than these need: cut as if they were many.
         assert_eq!(equal_counts(&few, 8)[1025], 3);
     }
 

@@ -1,8 +1,8 @@
-//! The transfer function: what a data value looks like to light.
+//! The transfer function: from data values to optics.
 //!
-//! Piecewise linear between points, clamped outside them; two points at one value are a jump, of
-//! which the later holds from there. All optics are evaluated segment by segment, which a small index finds in
-//! constant time; opacity and emission, which are read most, also from tables that agree with them but for rounding.
+//! Piecewise linear between points, clamped outside them; two points at one value are a jump, and
+//! the later one holds from there on. All optics are evaluated by segment, which a small index finds in
+//! constant time; opacity and emission, which are read most, also come from tables that agree up to rounding.
 
 mod difference;
 mod glow;
@@ -27,15 +27,15 @@ pub struct Optics {
     pub opacity: f32,
     /// Share of the extinguished light that is scattered, per channel; 0 to 1.
     pub albedo: Rgb,
-    /// Emitted radiance of matter in thermal balance, `Le`; at least 0.
+    /// Emitted radiance of matter in thermal equilibrium, `Le`; at least 0.
     pub emission: Rgb,
-    /// How much of the scattering is a reflection where the gradient is strong; 0 to 1.
+    /// Share of the scattering that is surface reflection where the gradient is strong; 0 to 1.
     pub surface: f32,
     /// Reflectance at normal incidence of glossy BRDFs; 0 to 1.
     pub specular: Rgb,
     /// Roughness of glossy BRDFs; 0 to 1.
     pub roughness: f32,
-    /// Refractive index; read by `refractive` alone.
+    /// Refractive index; read only by `refractive`.
     pub ior: f32,
 }
 
@@ -62,7 +62,7 @@ impl Optics {
         (Rgb::WHITE - self.albedo) * self.emission
     }
 
-    /// From `self` (t = 0) to `other` (t = 1), every quantity by itself.
+    /// From `self` (t = 0) to `other` (t = 1), each quantity separately.
     #[inline]
     #[must_use]
     pub fn lerp(&self, other: &Self, t: f32) -> Self {
@@ -94,7 +94,7 @@ pub enum TransferError {
     /// No point was given.
     #[error("a transfer function needs at least one point")]
     Empty,
-    /// Values fall, are not finite, or more than two points share one.
+    /// Values descend, are not finite, or more than two points share one.
     #[error("point {index}: values must be finite and ascend, with at most two points at one value")]
     Order {
         /// The offending point, counted from 0.
@@ -118,7 +118,7 @@ pub struct TransferFunction {
 const BINS: usize = 256;
 
 impl TransferFunction {
-    /// With a table over the points' own values.
+    /// With a table over the range of the points' values.
     ///
     /// # Errors
     /// [`TransferError`] if there is no point or the values do not ascend.
@@ -128,7 +128,7 @@ impl TransferFunction {
         Self::over(bins, points)
     }
 
-    /// With a table in certain bins, those of a volume, which no edit of the points moves.
+    /// With a table over given bins: those of a volume, which no edit of the points changes.
     ///
     /// # Errors
     /// [`TransferError`] if there is no point or the values do not ascend.
@@ -197,14 +197,14 @@ impl TransferFunction {
         a.optics.lerp(&b.optics, t)
     }
 
-    /// Opacity alone, for the many look-ups that need no more.
+    /// Opacity only, for the many look-ups that need nothing else.
     #[inline]
     #[must_use]
     pub fn opacity(&self, value: f32) -> f32 {
         self.opacities.opacity(value).unwrap_or_else(|| self.exact_opacity(value))
     }
 
-    /// Opacity by the points alone.
+    /// Opacity from the points, not the table.
     fn exact_opacity(&self, value: f32) -> f32 {
         let (a, b, t) = self.locate(value);
         a.optics.opacity + (b.optics.opacity - a.optics.opacity) * t
@@ -220,14 +220,14 @@ impl TransferFunction {
     #[must_use]
     pub fn opacity_range(&self, values: [f32; 2]) -> [f32; 2] {
         let [lo, hi] = values;
-        // Points that the table cannot tell from an end count as on its far side, as they do in a look-up.
+        // Points that share an end's position in the table count as beyond it, as they do in a look-up.
         let table = &self.opacities;
         let first = self.points.partition_point(|p| p.value <= lo || table.confuses(lo, p.value));
         let last = self.points.partition_point(|p| p.value <= hi || table.confuses(hi, p.value));
         extremes(&self.points[first..last.max(first)], values.map(|v| self.opacity(v)), |o| o.opacity)
     }
 
-    /// An upper bound of the luminance that matter with values in `[lo, hi]` emits per unit length at
+    /// An upper bound on the luminance that matter with values in `[lo, hi]` emits per unit length at
     /// density 1, `opacity (1 - albedo) Le`: zero exactly where nothing can glow.
     #[must_use]
     pub fn emission_bound(&self, values: [f32; 2]) -> f32 {
@@ -244,8 +244,8 @@ impl TransferFunction {
         opacity * Rgb::from(channel).luminance()
     }
 
-    /// Luminance that matter of a value emits per unit length at density 1, `opacity (1 - albedo) Le`: to the last bit what
-    /// [`Self::optics`] gives, without computing the other optics.
+    /// Luminance that matter of a value emits per unit length at density 1, `opacity (1 - albedo) Le`: equal to the
+    /// last bit to that of [`Self::optics`], without computing the other optics.
     #[inline]
     #[must_use]
     pub fn emitted_luminance(&self, value: f32) -> f32 {
@@ -270,7 +270,7 @@ impl TransferFunction {
         self.points.iter().any(|p| p.optics.surface > 0.0)
     }
 
-    /// [`Optics::emitted`] at a data value, for the many look-ups that need no more.
+    /// [`Optics::emitted`] at a data value, for the many look-ups that need nothing else.
     #[inline]
     #[must_use]
     pub fn emitted(&self, value: f32) -> Rgb {
@@ -279,8 +279,8 @@ impl TransferFunction {
     }
 }
 
-/// Smallest and largest of a quantity, given the points inside a range and what it is at the range's ends; exact, since a
-/// piecewise linear quantity has its extremes at the ends or at points between them.
+/// Smallest and largest value of a quantity, from the points inside a range and its values at the range's ends; exact,
+/// since a piecewise linear quantity has its extremes at the ends or at points between them.
 fn extremes(inside: &[Point], ends: [f32; 2], quantity: impl Fn(&Optics) -> f32) -> [f32; 2] {
     inside
         .iter()
@@ -338,7 +338,7 @@ mod tests {
         assert_eq!(jump.opacity(1.0 - 1e-6), 0.0);
         assert_eq!(jump.opacity_range([0.2, 0.9]), [0.0, 0.0]);
         assert_eq!(jump.opacity_range([0.2, 1.0]), [0.0, 1.0]);
-        // What a jump at the upper end leaves behind is still met below it.
+        // The value before a jump at the upper end still occurs just below it.
         let falls = vec![point(0.0, 0.1, 0.0), point(1.0, 0.7, 0.0), point(1.0, 0.2, 0.0)];
         assert_eq!(TransferFunction::new(falls).unwrap().opacity_range([0.0, 1.0]), [0.1, 0.7]);
         let one = TransferFunction::new(vec![point(5.0, 0.3, 0.0)]).unwrap();

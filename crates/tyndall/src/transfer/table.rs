@@ -1,7 +1,8 @@
 //! The opacity as lines in bins: constant time for one value, a few gathers for many.
 //!
-//! A bin that a single point of the function divides keeps two lines, so jumps stay jumps and, but for rounding, the table
-//! is the function. A bin of several points, or one too steep for single precision, is *rough* and sends to the function.
+//! A bin that a single point of the function divides keeps two lines, so jumps stay jumps and, up to rounding, the
+//! table equals the function. A bin with several points, or one too steep for single precision, is *rough*: there the
+//! function itself is evaluated.
 
 use super::Point;
 use crate::math::cast;
@@ -9,16 +10,16 @@ use crate::simd::Lanes;
 use crate::volume::ValueBins;
 use fearless_simd::prelude::*;
 
-/// Opacity per bin above which the rounding of a position in the bin would show, being 2^-14 of a bin at most.
+/// Slope in opacity per bin above which the rounding of a position, at most 2^-14 of a bin, would be visible.
 const STEEPEST: f64 = 8.0;
 
 /// See the module.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct OpacityTable {
     bins: ValueBins,
-    /// Where in its bin the second line begins, from 0 to 1; above that where there is one line alone, NaN in rough bins.
+    /// Where in its bin the second line begins, from 0 to 1; larger where there is only one line, NaN in rough bins.
     splits: Vec<f32>,
-    /// Per bin twice a line: opacity where it begins, at the bin's lower end or at the split, and its rise per bin.
+    /// Two lines per bin, each as the opacity where it begins (the bin's lower end or the split) and its rise per bin.
     lines: Vec<f32>,
     any_rough: bool,
 }
@@ -27,10 +28,10 @@ impl OpacityTable {
     /// The table of points in ascending order, at least one.
     pub(super) fn new(points: &[Point], bins: ValueBins) -> Self {
         let mut table = Self { bins, splits: Vec::new(), lines: Vec::new(), any_rough: false };
-        // Of points at one position the last holds from there.
+        // Of several points at one position, the last holds from there on.
         let knots: Vec<[f64; 2]> =
             points.iter().map(|p| [bins.position_beyond(p.value), f64::from(p.optics.opacity)]).collect();
-        // The line after a knot, told from a position on.
+        // The line after a knot, as one that begins at a position.
         let line = |after: usize, position: f64| -> [f64; 2] {
             let ([x, o], next) = (knots[after], knots.get(after + 1));
             let slope = next.filter(|n| n[0] > x).map_or(0.0, |n| (n[1] - o) / (n[0] - x));
@@ -42,7 +43,7 @@ impl OpacityTable {
             let end = knots.partition_point(|k| k[0] < lower + 1.0);
             let below = if start == 0 { [knots[0][1], 0.0] } else { line(start - 1, lower) };
             let after = if start == end { below } else { line(end - 1, lower) };
-            // Points on a level say nothing, and are not to be told from none.
+            // Points within a constant stretch are redundant, and must give the same row as no points.
             let level =
                 below[1] == 0.0 && after == below && knots[start..end].iter().all(|k| k[1] == below[0]);
             let positions = if level { &[] } else { &knots[start..end] };
@@ -50,7 +51,7 @@ impl OpacityTable {
             let above = if positions.is_empty() { below } else { line(end - 1, lower + split) };
             let one_place = positions.iter().all(|k| k[0] == positions[0][0]);
             let steep = [below, above].iter().any(|l| l[1].abs() > STEEPEST);
-            // Whatever lies beyond the outer ends is looked up at them.
+            // Look-ups beyond the outer ends are clamped to them.
             let beyond = match bin {
                 0 => &knots[..knots.len().min(start + 1)],
                 _ if bin + 1 == ValueBins::COUNT => &knots[start.saturating_sub(1)..],
@@ -71,8 +72,8 @@ impl OpacityTable {
         self.bins
     }
 
-    /// Whether look-ups in a bin read other bits than those of another table in the same bins, or ask the function where that one
-    /// does not.
+    /// Whether look-ups in a bin differ in any bit from those of another table over the same bins, or only one of the
+    /// two evaluates the function there.
     pub(super) fn differs(&self, other: &Self, bin: usize) -> bool {
         let row = |table: &Self| {
             let split = table.splits[bin];
@@ -82,7 +83,7 @@ impl OpacityTable {
         row(self) != row(other)
     }
 
-    /// Whether the table cannot tell the first value from the second, nor what lies between them.
+    /// Whether two values, and all values between them, have the same position in the table.
     pub(super) fn confuses(&self, a: f32, b: f32) -> bool {
         let position = self.bins.position(a);
         position == self.bins.position(b) && !self.splits[cast::index(position)].is_nan()
@@ -166,7 +167,7 @@ mod tests {
             function(&[&[(-3.0, 0.5)], &close[..], &[(7.0, 0.5)]].concat()),
             function(&many),
             function(&[(-3e38, 0.0), (0.0, 1.0), (3e38, 0.5)]),
-            // In bins of data that the points reach past, on both sides, on one, and lie wholly beside.
+            // Over bins of data that the points extend past on both sides, on one, or miss altogether.
             over([0.25, 0.75], &[(-1.0, 0.9), (0.3, 0.1), (0.5, 0.6), (2.0, 0.2), (3.0, 1.0)]),
             over([0.25, 0.75], &[(0.5, 0.0), (0.7, 0.5), (9.0, 0.5)]),
             over([0.25, 0.75], &[(1.0, 0.2), (1.5, 0.8), (1.5, 0.1)]),
@@ -175,7 +176,7 @@ mod tests {
         ]
     }
 
-    /// Values across, at and just beside the points.
+    /// Values at the points, and across their range and beyond.
     fn values(function: &TransferFunction) -> Vec<f32> {
         let ends = [0, function.points().len() - 1].map(|i| function.points()[i].value);
         let middle = 0.5 * ends[0] + 0.5 * ends[1];

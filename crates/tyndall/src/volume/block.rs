@@ -1,4 +1,4 @@
-//! Reading the field at the positions of a small block, each sample once.
+//! Reading the field at a small block of positions, with each sample read once.
 
 use super::Voxel;
 use super::bricks::{Lattice, mix};
@@ -6,11 +6,11 @@ use crate::math::cast;
 
 /// One axis of a block of positions, see [`Lattice::linear_block`].
 struct BlockAxis {
-    /// Positions asked for.
+    /// Number of positions.
     count: usize,
-    /// Of each the sample below, among those read, and the fraction to the next; those past the count repeat the last.
+    /// Of each the sample below, among those read, and the fraction to the next; entries past `count` repeat the last.
     positions: [(usize, f32); 4],
-    /// Samples read, and where they lie along the axis; those past them repeat the last.
+    /// Number of samples read, and their memory offsets along the axis; entries past that number repeat the last.
     samples: usize,
     offsets: [usize; 5],
 }
@@ -37,12 +37,12 @@ impl BlockAxis {
 }
 
 impl Lattice {
-    /// The field at all positions whose coordinates along each axis are among up to four ascending ones, no further apart than 1,
-    /// x fastest: what [`Self::linear`] gives at each, to the last bit, with each sample read once.
+    /// The field at all combinations of up to four ascending coordinates per axis, at most 1 apart, x fastest: equal to
+    /// [`Self::linear`] at each, to the last bit, with each sample read once.
     pub(super) fn linear_block<T: Voxel>(&self, samples: &[T], axes: [&[f32]; 3], out: &mut [f32]) {
         let axes = [0, 1, 2].map(|a| BlockAxis::new(self, a, axes[a]));
         let [x, y, z] = &axes;
-        // Mixed along x, then y, then z, as one by one.
+        // Interpolated along x, then y, then z, as for single positions.
         let mut rows = [[[0.0_f32; 4]; 5]; 5];
         for (k, &z) in z.offsets[..z.samples].iter().enumerate() {
             for (j, &y) in y.offsets[..y.samples].iter().enumerate() {
@@ -63,7 +63,7 @@ impl Lattice {
             let pairs = planes[k].iter().zip(&planes[k + 1]).take(y.count);
             for (near, far) in pairs {
                 let values = near.iter().zip(far).take(x.count).map(|(&near, &far)| mix(near, far, f));
-                // In this order: a `zip` that ends takes one more of its first.
+                // In this order: a `zip` that ends has taken one more item from its first iterator.
                 values.zip(out.by_ref()).for_each(|(value, out)| *out = value);
             }
         }

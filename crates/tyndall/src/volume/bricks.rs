@@ -1,5 +1,5 @@
 //! The samples in bricks: small blocks, each with a copy of its neighbours' first samples, so that a trilinear
-//! look-up reads one block and positions near each other share cache lines whatever the direction.
+//! look-up reads one block and nearby positions share cache lines whatever the direction.
 
 use super::voxels::with_voxels;
 use super::{Interpolation, Voxel, Voxels};
@@ -13,12 +13,12 @@ pub const BRICK: usize = 8;
 const PADDING: usize = 4;
 
 /// Samples on a lattice, cut into bricks. Brick `i` of an axis holds samples `8 i ..= 8 i + 8`, clamped to the last;
-/// an axis of fewer than nine samples has one brick of as many.
+/// an axis of fewer than nine samples has one brick with all of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bricks {
-    /// Brick by brick, x fastest, and so inside each.
+    /// Brick by brick, x fastest, and inside each brick x fastest.
     samples: Voxels,
-    /// Samples along each axis of the whole.
+    /// Samples along each axis of the whole lattice.
     dims: [usize; 3],
     /// Bricks along each axis.
     counts: [usize; 3],
@@ -26,24 +26,24 @@ pub struct Bricks {
     edge: [usize; 3],
 }
 
-/// What a look-up needs to know of the layout, worked out once.
+/// What a look-up needs to know of the layout, computed once.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lattice {
     /// Index of the last sample along each axis.
     pub last: [f32; 3],
-    /// Largest lower corner of a cell: the last sample but one.
+    /// Largest index of a cell's lower corner: the last sample but one.
     pub lower: [i32; 3],
-    /// Memory from a sample to the next along each axis, inside a brick; 0 where the axis has one sample alone.
+    /// Memory offset from a sample to the next along each axis, inside a brick; 0 where the axis has only one sample.
     pub step: [usize; 3],
-    /// Memory from a brick to the next along each axis.
+    /// Memory offset from a brick to the next along each axis.
     pub brick_step: [usize; 3],
-    /// The steps as lanes multiply by them, modulo 2^32: from a sample to the next, and what a whole brick adds to eight
-    /// of these.
+    /// The steps by which lanes multiply, modulo 2^32: from a sample to the next, and from a brick to the next less
+    /// eight of these.
     pub lane_steps: [[u32; 2]; 3],
 }
 
 impl Bricks {
-    /// Cuts samples, x fastest, into bricks, in parallel on the current pool; also gives the smallest and the largest
+    /// Cuts samples, x fastest, into bricks, in parallel on the current pool; also returns the smallest and the largest
     /// sample of each brick.
     pub(super) fn new(dims: [usize; 3], linear: &Voxels) -> (Self, Vec<[f64; 2]>) {
         let counts = counts(dims);
@@ -70,7 +70,7 @@ impl Bricks {
         samples.checked_mul(sample).map(|bytes| bytes as u64)
     }
 
-    /// The samples brick by brick, with some more at the end.
+    /// The samples brick by brick, with padding at the end.
     pub(crate) fn samples(&self) -> &Voxels {
         &self.samples
     }
@@ -99,7 +99,7 @@ impl Bricks {
         }
     }
 
-    /// Where a sample lies.
+    /// Memory offset of a sample.
     fn offset(&self, sample: [usize; 3]) -> usize {
         let [x, y, z] = self.edge;
         let brick: [usize; 3] = std::array::from_fn(|a| (sample[a] / BRICK).min(self.counts[a] - 1));
@@ -134,7 +134,7 @@ impl Bricks {
         gather!(U8 I8 U16 I16 U32 I32 F32 F64)
     }
 
-    /// Folds over all stored samples, each once, layer of bricks by layer in parallel on the current pool.
+    /// Folds over all stored samples, each once, with layers of bricks in parallel on the current pool.
     pub(super) fn fold<A: Send>(
         &self,
         start: impl Fn() -> A + Sync + Send,
@@ -153,7 +153,8 @@ impl Bricks {
                         for i in 0..self.counts[0] {
                             let row = own(i, 0);
                             let first = self.offset([row.start, y, z]);
-                            // The last sample of a row may be another brick's by number, but is in this one too.
+                            // By index, the last sample of a row may belong to another brick, but it is in this one
+                            // too.
                             data[first..first + row.len()].iter().for_each(|v| take(&mut sum, v.to_f64()));
                         }
                     }
@@ -228,7 +229,7 @@ impl Lattice {
         }
     }
 
-    /// Memory of a sample along an axis, of those that are the lower corner of a cell.
+    /// Memory offset along an axis of a sample that is the lower corner of a cell.
     #[inline]
     pub(super) fn along(&self, a: usize, i: i32) -> usize {
         let i = i.cast_unsigned() as usize;
@@ -258,7 +259,7 @@ impl Lattice {
     fn nearest<T: Voxel>(&self, samples: &[T], p: Vec3) -> f32 {
         let position = |a: usize| {
             let i = cast::truncate(p[a].max(0.0).min(self.last[a]) + 0.5);
-            // The last sample of an axis may stand after the last cell of the last brick.
+            // The last sample of an axis may come after the last cell of the last brick.
             let lower = i.min(self.lower[a]);
             self.along(a, lower) + usize::from(i > lower) * self.step[a]
         };

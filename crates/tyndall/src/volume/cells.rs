@@ -1,14 +1,14 @@
-//! Smallest and largest value per cell: what skipping and majorants stand on.
+//! Smallest and largest value per cell: the basis of skipping and majorants.
 
 use super::bricks::{BRICK, Bricks};
 use super::{Grid, ValueMap};
 use crate::math::{Bounds, Vec3, cast};
 use rayon::prelude::*;
 
-/// A coarse grid over the medium's box: each cell knows the range of the interpolated field inside it.
+/// A coarse grid over the medium's box: each cell holds the range of the interpolated field inside it.
 ///
-/// Cell `i` covers `[cell * i, cell * (i + 1)]` in index space, so that reading there touches the voxels from
-/// `cell * i` to `cell * (i + 1)` and no other; the outermost cells reach on to the border of the box, half a voxel
+/// Cell `i` covers `[cell * i, cell * (i + 1)]` in index space, so that reads there touch only the voxels from
+/// `cell * i` to `cell * (i + 1)`; the outermost cells extend to the border of the box, half a voxel
 /// past the outer centres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cells {
@@ -18,7 +18,7 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// Voxels along a cell's edge unless told otherwise: those of a brick, and the best or second best of 4, 8 and
+    /// Default number of voxels along a cell's edge: that of a brick, and the best or second best of 4, 8 and
     /// 16 for CT and clouds alike.
     pub const EDGE: usize = BRICK;
 
@@ -69,7 +69,7 @@ impl Cells {
         pick(position.x, nx) + nx * (pick(position.y, ny) + ny * pick(position.z, nz))
     }
 
-    /// The cells that meet the box that reaches so far from an index-space position along each axis.
+    /// The cells that meet the box that extends by `reach` to both sides of an index-space position along each axis.
     pub fn cells_within(&self, p: Vec3, reach: Vec3) -> impl Iterator<Item = usize> {
         let [first, last] = [p - reach, p + reach].map(|p| coordinates(self.cell_at(p), self.dims));
         let [nx, ny, _] = self.dims;
@@ -93,7 +93,7 @@ fn coordinates(number: usize, [nx, ny, _]: [usize; 3]) -> [usize; 3] {
     [number % nx, number / nx % ny, number / (nx * ny)]
 }
 
-/// Rounds as look-ups do, so that what a cell of one value holds is what is read there.
+/// Rounds as look-ups do, so that a cell with a single value holds exactly what is read there.
 fn to_values(values: ValueMap, stored: [f64; 2]) -> [f32; 2] {
     let [slope, intercept] = [values.slope, values.intercept].map(cast::single);
     let [a, b] = stored.map(|v| slope * cast::single(v) + intercept);

@@ -1,4 +1,4 @@
-//! Where the voxels lie: dimensions and the map between index space and the world.
+//! Where the voxels are: dimensions and the map between index space and the world.
 
 use crate::math::{Affine3A, Bounds, DMat3, DVec3, Mat3, Ray, Vec3, cast};
 
@@ -41,10 +41,10 @@ pub struct Grid {
     voxel_size: f32,
 }
 
-/// Why a grid cannot be.
+/// Why a grid is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GridError {
-    /// An axis has no voxel, or more than 2^24, past which single precision no longer tells voxels apart.
+    /// An axis has no voxel, or more than 2^24, beyond which single precision cannot tell voxels apart.
     #[error("dimensions {0:?}: expected 1 to 16777216 voxels along each axis")]
     Dims([usize; 3]),
     /// The number of voxels overflows the address space.
@@ -73,11 +73,11 @@ impl Grid {
         Self::new(dims, spacing, IDENTITY, origin, Space::Plain)
     }
 
-    /// From what a file says: `direction` as rows of a 3x3 matrix whose column `j` is the world
+    /// From what a file states: `direction` as rows of a 3x3 matrix whose column `j` is the world
     /// direction of index axis `j` (unit length; a left-handed matrix is fine).
     ///
     /// # Errors
-    /// [`GridError`] names the part that cannot be.
+    /// [`GridError`] names the part that is invalid.
     pub fn new(
         dims: [usize; 3],
         spacing: [f64; 3],
@@ -133,13 +133,13 @@ impl Grid {
         self.dims.iter().product()
     }
 
-    /// Never: a grid has at least one voxel.
+    /// Always false: a grid has at least one voxel.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         false
     }
 
-    /// Distance of voxel centres along each axis, world units.
+    /// Distance between voxel centres along each axis, world units.
     #[must_use]
     pub fn spacing(&self) -> [f64; 3] {
         self.spacing

@@ -54,15 +54,15 @@ impl Volume {
 }
 
 impl Lattice {
-    /// Memory of a number along an axis, for samples that are the lower corner of a cell.
+    /// Memory offset along an axis of a sample, by number, that is the lower corner of a cell.
     #[inline(always)]
     fn memory_lanes<S: Lanes>(&self, a: usize, number: S::u32s) -> S::u32s {
-        // Whole bricks, and samples in the last of them, with one multiplication less than that says.
+        // Whole bricks, plus samples in the last of them, in fewer operations than written that way.
         let [step, per_brick] = self.lane_steps[a];
         (number >> BRICK.ilog2()) * per_brick + number * step
     }
 
-    /// Memory of the lower corner of the cell along an axis, and how far into the cell.
+    /// Memory offset of the lower corner of the cell along an axis, and the position inside the cell.
     #[inline(always)]
     fn cell_lanes<S: Lanes>(&self, simd: S, a: usize, x: S::f32s) -> (S::u32s, S::f32s) {
         let x = x.max(0.0).min(self.last[a]);
@@ -71,7 +71,7 @@ impl Lattice {
         (self.memory_lanes::<S>(a, cell.bitcast()), x - cell.to_float::<S::f32s>())
     }
 
-    /// Memory of the nearest sample along an axis, which may stand after the last cell.
+    /// Memory offset of the nearest sample along an axis, which may come after the last cell.
     #[inline(always)]
     fn nearest_lanes<S: Lanes>(&self, simd: S, a: usize, x: S::f32s) -> S::u32s {
         let index: S::i32s = (x.max(0.0).min(self.last[a]) + 0.5).to_int();
@@ -86,7 +86,7 @@ fn mix<S: Lanes>(a: S::f32s, b: S::f32s, t: S::f32s) -> S::f32s {
     (b - a).mul_add(t, a)
 }
 
-/// Between a pair along x.
+/// Interpolates between a pair along x.
 #[inline(always)]
 fn row<S: Lanes, T: Pair>(simd: S, samples: &[T], index: S::u32s, step: u32, t: S::f32s) -> S::f32s {
     let (a, b) = T::pair(simd, samples, index, step);
@@ -95,12 +95,12 @@ fn row<S: Lanes, T: Pair>(simd: S, samples: &[T], index: S::u32s, step: u32, t: 
 
 /// Samples that can be read two at a time.
 trait Pair: Voxel {
-    /// The sample at an index per lane and the one `step` (0 or 1) after it; where `step` is 0 the second may be anything
-    /// finite.
+    /// The sample at an index per lane and the one `step` (0 or 1) after it; where `step` is 0 the second may be
+    /// anything finite.
     fn pair<S: Lanes>(simd: S, samples: &[Self], index: S::u32s, step: u32) -> (S::f32s, S::f32s);
 }
 
-/// Both of a pair from one word: shifted up to its end and down again, with the sign or without.
+/// Both samples of a pair from one word: each is shifted up to its end and down again, with or without the sign.
 macro_rules! pair_in_a_word {
     ($($type:ty: $words:ident)*) => {$(
         impl Pair for $type {
@@ -123,7 +123,7 @@ impl Pair for f32 {
     }
 }
 
-/// Wide types are rare: one by one.
+/// Wide types are rare, and are read one by one.
 macro_rules! pair_one_by_one {
     ($($type:ty)*) => {$(
         impl Pair for $type {

@@ -1,6 +1,6 @@
 //! A volume: samples on a grid, and the continuous field between them.
 //!
-//! Values are *data values*: what the file means, after slope and intercept. The field is trilinear
+//! Values are *data values*: the file's values after slope and intercept. The field is trilinear
 //! between voxel centres (or nearest), and clamped to the edge value in the half voxel around them.
 
 mod block;
@@ -57,7 +57,7 @@ impl ValueMap {
     }
 }
 
-/// Why samples and grid do not make a volume.
+/// Why samples and grid do not form a volume.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VolumeError {
     /// The number of samples does not fit the dimensions.
@@ -97,12 +97,12 @@ pub struct Volume {
     intercept: f32,
 }
 
-/// Statistics that are computed once, when they are first asked for, and are then kept with the samples.
+/// Statistics that are computed once, when first needed, and then kept with the samples.
 #[derive(Debug, Default)]
 struct Statistics {
     robust: OnceLock<Histogram>,
     value_bins: OnceLock<Histogram>,
-    /// Cells by their edge.
+    /// Cells, keyed by their edge.
     cells: Mutex<BTreeMap<usize, Arc<Cells>>>,
 }
 
@@ -111,7 +111,7 @@ impl Volume {
     /// the ranges, in parallel on the current thread pool.
     ///
     /// # Errors
-    /// [`VolumeError`] if the number of samples, the slope or the intercept cannot be.
+    /// [`VolumeError`] if the number of samples, the slope or the intercept is invalid.
     pub fn new(grid: Grid, mut voxels: Voxels, values: ValueMap) -> Result<Self, VolumeError> {
         if voxels.len() != grid.len() {
             return Err(VolumeError::Samples {
@@ -144,7 +144,7 @@ impl Volume {
         })
     }
 
-    /// The same volume read another way between voxel centres.
+    /// The same volume with another interpolation between voxel centres.
     #[must_use]
     pub fn with_interpolation(mut self, interpolation: Interpolation) -> Self {
         self.interpolation = interpolation;
@@ -166,7 +166,7 @@ impl Volume {
         self.interpolation
     }
 
-    /// Where the voxels lie.
+    /// Where the voxels are.
     #[must_use]
     pub fn grid(&self) -> &Grid {
         &self.grid
@@ -203,23 +203,23 @@ impl Volume {
     }
 
     /// The range without the outermost 0.1 % of the samples on each side, so that a few outliers
-    /// ruin nothing; the exact range where that would leave a single value.
+    /// do not distort it; the exact range where that would leave a single value.
     #[must_use]
     pub fn robust_range(&self) -> [f64; 2] {
         self.robust_range
     }
 
-    /// Bins over all values that can be read here; over those of the robust range where outliers would leave that few
+    /// Bins over all values that can be read here; over those of the robust range where outliers would leave it too few
     /// bins.
     #[must_use]
     pub fn value_bins(&self) -> ValueBins {
-        /// Past so many times the robust range, outliers have the outer bins to themselves.
+        /// If the value range is more than this many times the robust range, outliers go to the outer bins.
         const FAR_OUT: f64 = 16.0;
 
         let width = |[lo, hi]: [f64; 2]| hi - lo;
         let few = width(self.value_range) > FAR_OUT * width(self.robust_range);
         let [lo, hi] = (if few { self.robust_range } else { self.value_range }).map(cast::single);
-        // A bin more at either end holds what interpolation rounds up or down.
+        // One more bin at either end holds what interpolation rounds up or down.
         let bin = (0.5 * hi - 0.5 * lo) / (ValueBins::INSIDE as f32 / 2.0);
         ValueBins::new([(lo - bin).max(f32::MIN), (hi + bin).min(f32::MAX)])
     }
@@ -248,7 +248,7 @@ impl Volume {
         if (1..LEAST_KEPT).contains(&edge) {
             return new();
         }
-        // The lock is not held while cells are made in parallel, or a worker that waits for it could block the others.
+        // The lock is not held while cells are built in parallel, or a worker that waits for it could block the others.
         let kept = || self.statistics.cells.lock().unwrap_or_else(PoisonError::into_inner);
         let found = kept().get(&edge).cloned();
         found.unwrap_or_else(|| {
@@ -300,8 +300,8 @@ impl Volume {
         self.slope * stored + self.intercept
     }
 
-    /// [`Self::value`] at all positions whose coordinates along each axis are among up to four ascending ones, no further apart
-    /// than 1; x fastest, to the last bit.
+    /// [`Self::value`], to the last bit, at all combinations of up to four ascending coordinates per axis, at most 1
+    /// apart; x fastest.
     pub(crate) fn value_block(&self, axes: [&[f32]; 3], out: &mut [f32]) {
         match self.interpolation {
             Interpolation::Linear => with_voxels!(self.bricks.samples(), samples => {
@@ -322,7 +322,7 @@ impl Volume {
         out.iter_mut().for_each(|stored| *stored = self.slope * *stored + self.intercept);
     }
 
-    /// Gradient of the field per world unit, by central differences of points one voxel apart
+    /// Gradient of the field per world unit, by central differences between points one voxel apart
     /// (half a voxel to each side along every index axis).
     #[inline]
     #[must_use]
@@ -356,7 +356,7 @@ mod tests {
     fn the_gradient_sees_one_voxel_and_no_further() {
         let grid = Grid::centred([6, 1, 1], [0.5, 1.0, 1.0]).unwrap();
         let volume = Volume::new(grid, Voxels::U8(vec![0, 0, 0, 1, 1, 1]), ValueMap::IDENTITY).unwrap();
-        // Per world unit, of which a voxel is half: the whole jump midway, half of it at a centre.
+        // Per world unit, with voxels half a unit wide: the whole jump midway, half of it at a centre.
         let found = [1.5, 2.0, 2.5, 3.5].map(|x| volume.gradient(Vec3::X * x));
         assert_eq!(found, [0.0, 1.0, 2.0, 0.0].map(|g| Vec3::X * g));
     }

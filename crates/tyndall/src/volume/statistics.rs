@@ -1,4 +1,4 @@
-//! What the samples tell as a whole: ranges and histogram.
+//! Statistics of all samples: ranges and histogram.
 
 use super::voxels::with_voxels;
 use super::{Bricks, ValueMap, Voxel, Voxels};
@@ -71,8 +71,8 @@ pub(super) fn value_range(voxels: &Voxels, values: ValueMap) -> [f64; 2] {
 /// Share of the samples cut off at each end of the robust range.
 const OUTLIERS: f64 = 0.001;
 
-/// At most this many samples, evenly strided, decide the robust range: their quantiles stand within
-/// 0.01 % of a share, and sorting them takes no time beside loading.
+/// At most this many samples, evenly strided, decide the robust range: their quantiles are within
+/// 0.01 % of the share, and sorting them takes negligible time compared to loading.
 const SURVEYED: usize = 1 << 20;
 
 /// Quantiles [`OUTLIERS`] and 1 - [`OUTLIERS`]; the exact range where they coincide.

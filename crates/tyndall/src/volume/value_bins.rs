@@ -1,4 +1,4 @@
-//! Equal bins over the data's values, in which tables of optics and histories of light are kept.
+//! Equal bins over the data's values, used by tables of optics and histories of light.
 
 use crate::math::cast;
 use crate::simd::Lanes;
@@ -6,10 +6,10 @@ use fearless_simd::prelude::*;
 
 /// [`Self::INSIDE`] equal bins over a range of values, one more for all below it, and one for all above.
 ///
-/// They follow from the data alone, so that an edit of a transfer function moves none.
+/// They depend on the data alone, so that no edit of a transfer function moves them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ValueBins {
-    /// Half the lower end, and bins per half a unit of value: halves, whose differences never overflow.
+    /// Half the lower end, and bins per half unit of value: differences of halves never overflow.
     half_first: f32,
     per_half: f32,
 }
@@ -35,15 +35,15 @@ impl ValueBins {
         self.per_half.is_normal()
     }
 
-    /// The bin of a value, plus the position in it from 0 to 1; never falls as values rise.
+    /// The bin of a value, plus the position in it from 0 to 1; never decreases as values increase.
     #[inline]
     #[must_use]
     pub fn position(self, value: f32) -> f32 {
         self.unbounded(value).max(0.0).min((Self::COUNT - 1) as f32)
     }
 
-    /// For lanes, which compute the same: what [`Self::position`] subtracts from half a value and then multiplies it by, before it adds 1 and clamps; each
-    /// operation rounds.
+    /// For lanes, which compute the same: what [`Self::position`] subtracts from half a value, and what it then
+    /// multiplies the difference by, before it adds 1 and clamps; each operation rounds.
     #[inline]
     pub(crate) fn numbers(self) -> [f32; 2] {
         [self.half_first, self.per_half]
@@ -53,7 +53,7 @@ impl ValueBins {
         (value * 0.5 - self.half_first) * self.per_half + 1.0
     }
 
-    /// [`Self::position`] without bounds: as that rounds it where it has none, else in double precision.
+    /// [`Self::position`] without clamping: rounded as there where it does not clamp, else in double precision.
     pub(crate) fn position_beyond(self, value: f32) -> f64 {
         let rounded = self.unbounded(value);
         if (0.0..Self::COUNT as f32).contains(&rounded) {
@@ -62,7 +62,7 @@ impl ValueBins {
         (f64::from(value) * 0.5 - f64::from(self.half_first)) * f64::from(self.per_half) + 1.0
     }
 
-    /// The value at a position, but for rounding.
+    /// The value at a position, up to rounding.
     #[must_use]
     pub fn value(self, position: f32) -> f32 {
         ((position - 1.0) / self.per_half + self.half_first) * 2.0

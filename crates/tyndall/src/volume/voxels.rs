@@ -1,4 +1,4 @@
-//! The samples themselves, kept in the type that the file has.
+//! The samples themselves, in the file's type.
 
 use crate::math::cast;
 
@@ -102,9 +102,9 @@ impl Voxels {
         with_voxels!(self, data => data[index].to_f64())
     }
 
-    /// Replaces NaN and the infinity on the same side by the finite sample of smallest data value, the
-    /// other infinity by the one of largest (0 if no sample is finite); returns how many there were.
-    /// `slope` tells which end of the stored samples is the small one.
+    /// Replaces NaN, and the infinity with the smaller data value, by the finite sample with the smallest data
+    /// value, and the other infinity by the one with the largest (0 if no sample is finite); returns how many
+    /// were replaced. The sign of `slope` decides which end of the stored samples has the smallest data value.
     pub(super) fn mend_non_finite(&mut self, slope: f64) -> u64 {
         match self {
             Self::F32(data) => fix(data, f32::is_finite, f32::INFINITY.copysign(cast::single(slope)), 0.0),

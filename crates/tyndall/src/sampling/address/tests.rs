@@ -66,7 +66,7 @@ fn rows_meet_if_all_their_words_do() {
     assert_eq!(overlaps(&rows), BTreeSet::from([["a", "b"], ["b", "c"]]));
 }
 
-/// Numbers that are drawn lie in the words from which the overlaps are told.
+/// The words of drawn numbers are within the ranges by which overlaps are found.
 #[test]
 fn words_are_those_of_the_row() {
     let mut numbers = Stream::new(1, [0; 3]);

@@ -3,7 +3,7 @@
 use super::coat::Half;
 use crate::math::cast;
 
-/// Why an ABC distribution cannot be.
+/// Why an ABC distribution is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum BrdfError {
     /// The width is out of range.
@@ -17,11 +17,11 @@ pub enum BrdfError {
 /// Microfacets distributed by `D(h) = A / (1 + B (1 - n . h))^C` \[Low12, eq. 15\], where
 /// `f_r = base + F(k . h) D(h) G / (4 (n . w_in) (n . w_out))`.
 ///
-/// B sets how narrow the lobe is and C how slowly it falls off. The source fits A per material and lets
-/// it take any scale; here A follows from `integral of D(h) (n . h) dh = 1`, which makes `D` a
-/// distribution of facets, and the factor 1/4 of mirroring is written out. The source's diffuse
-/// term is constant; here it is the coupled one of \[Ashikhmin00\], since a constant one beside a Fresnel term
-/// reflects more than it gets at grazing. With the V-groove `G` \[Torrance67\] both together are
+/// B sets how narrow the lobe is and C how slowly it falls off. The paper fits A per material, at
+/// any scale; here A follows from `integral of D(h) (n . h) dh = 1`, which makes `D` a
+/// distribution of facets, and the factor 1/4 of mirroring is explicit. The paper's diffuse
+/// term is constant; here it is the coupled one of \[Ashikhmin00\], since a constant one plus a Fresnel term
+/// reflects more than it receives at grazing. With the V-groove `G` \[Torrance67\] both together are
 /// reciprocal and reflect at most 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Abc {
@@ -29,7 +29,7 @@ pub struct Abc {
     c: f32,
     /// A: `D` at `n`, \[1/sr\].
     peak: f32,
-    /// Density over facets at `n` of a draw by `D` alone, \[1/sr\].
+    /// Density over facets at `n` when `D` alone is sampled, \[1/sr\].
     drawn_peak: f32,
     /// `(1 + B)^(1 - C) - 1`.
     span: f32,
@@ -73,12 +73,12 @@ impl Abc {
     /// The specular term without its Fresnel factor.
     #[inline]
     pub(super) fn eval(&self, half: Half, cos_in: f32, cos_out: f32) -> f32 {
-        // V-grooves [Torrance67] hide what their other side covers.
+        // V-grooves [Torrance67]: one side of a groove hides part of the other.
         let open = 2.0 * (1.0 - half.drop) * cos_in.min(cos_out) / half.cos;
         self.peak * self.fall_off(half.drop) * open.min(1.0) / (4.0 * cos_in * cos_out)
     }
 
-    /// Draws `1 - n . h` of a facet by `D`, whose integral has an inverse.
+    /// Samples `1 - n . h` of a facet from `D`, whose integral can be inverted.
     #[inline]
     pub(super) fn draw_drop(&self, u: f32) -> f32 {
         let power = 1.0 - self.c;
@@ -125,7 +125,7 @@ fn projected_area(b: f64, c: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Over drops on a grid that is dense where the distribution is.
+    /// Integral over drops, on a grid that is dense where the distribution is.
     fn over_facets(abc: &Abc, f: impl Fn(f64) -> f64) -> f64 {
         let n = 200_000;
         (0..n)

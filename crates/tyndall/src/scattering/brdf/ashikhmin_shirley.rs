@@ -3,7 +3,7 @@
 use super::coat::Half;
 use std::f32::consts::TAU;
 
-/// Below this roughness a lobe is narrower than single precision can tell directions apart.
+/// Below this roughness a lobe is narrower than single precision can resolve.
 const LEAST_ROUGHNESS: f32 = 0.02;
 
 /// A Phong lobe about the normal, over half vectors: `(n . h)^exponent`.
@@ -27,7 +27,7 @@ impl AshikhminShirley {
         self.pdf(half) / larger_cos
     }
 
-    /// Draws `1 - n . h` of a facet \[Ashikhmin00, eq. 10\].
+    /// Samples `1 - n . h` of a facet \[Ashikhmin00, eq. 10\].
     #[inline]
     pub fn draw_drop(self, u: f32) -> f32 {
         -((-u).ln_1p() / (self.exponent + 1.0)).exp_m1()
@@ -39,7 +39,7 @@ impl AshikhminShirley {
         (self.exponent + 1.0) / TAU * self.phong(half.drop) / (4.0 * half.cos)
     }
 
-    /// `(1 - drop)^exponent`, by the logarithm that keeps small drops.
+    /// `(1 - drop)^exponent`, by a logarithm that is accurate for small drops.
     #[inline]
     fn phong(self, drop: f32) -> f32 {
         (self.exponent * (-drop).ln_1p()).exp()

@@ -9,7 +9,7 @@ use std::f32::consts::PI;
 pub struct Half {
     /// `1 - n . h`, in [0, 1].
     pub drop: f32,
-    /// Cosine of both directions to it.
+    /// Cosine of the angle between it and either direction.
     pub cos: f32,
 }
 
@@ -18,7 +18,7 @@ impl Half {
     #[inline]
     pub fn between(n: Vec3, a: Vec3, b: Vec3) -> Self {
         let sum = a + b;
-        // Opposed directions have no half vector; the least length stands for "at right angles to both".
+        // Opposite directions have no half vector; the smallest length makes it perpendicular to both.
         let length = sum.length().max(f32::EPSILON);
         // |n - h|^2 / 2 is 1 - n . h with all its digits, which a narrow lobe needs.
         let drop = 0.5 * (n - sum / length).length_squared();
@@ -26,7 +26,7 @@ impl Half {
     }
 }
 
-/// Reflectance of a facet seen at a cosine, from its reflectance at normal incidence \[Schlick94\].
+/// Reflectance of a facet seen at a given cosine, from its reflectance at normal incidence \[Schlick94\].
 #[inline]
 pub fn fresnel(at_normal: Rgb, cos: f32) -> Rgb {
     let rise = fifth(1.0 - cos);
@@ -35,20 +35,20 @@ pub fn fresnel(at_normal: Rgb, cos: f32) -> Rgb {
 
 /// The diffuse term under a glossy coat \[Ashikhmin00, eq. 5\]:
 /// `28 Rd / (23 pi) (1 - Rs) (1 - (1 - cos_in/2)^5) (1 - (1 - cos_out/2)^5)`.
-/// It fades towards grazing, where the coat reflects all, and so the sum keeps within 1.
+/// It fades towards grazing, where the coat reflects everything, so that the sum stays within 1.
 #[inline]
 pub fn base(surface: &Surface, cos_in: f32, cos_out: f32) -> Rgb {
     base_reflectance(surface, cos_in) * (28.0 / (23.0 * PI) * passed(cos_out))
 }
 
-/// What [`base`] reflects in total of light at a cosine: its integral over the other direction with
-/// that one's cosine.
+/// Total reflectance of [`base`] for light at a given cosine: its cosine-weighted integral over the
+/// other direction.
 #[inline]
 pub fn base_reflectance(surface: &Surface, cos: f32) -> Rgb {
     surface.albedo * surface.specular.map(|r| 1.0 - r) * passed(cos)
 }
 
-/// The share that a coat lets through, for no reflectance at normal incidence.
+/// The share that a coat with no reflectance at normal incidence lets through.
 #[inline]
 fn passed(cos: f32) -> f32 {
     1.0 - fifth(1.0 - 0.5 * cos)

@@ -1,7 +1,7 @@
-//! BRDFs: how a surface that the data show reflects light.
+//! BRDFs: how a surface in the data reflects light.
 //!
 //! `w_in` points to where the light comes from and `w_out` to where it goes; both leave the surface.
-//! The normal is two-sided: only whether both directions lie on one side of it matters. Values of
+//! The normal is two-sided: it only matters whether both directions are on the same side. Values of
 //! `eval` are `f_r` alone, \[1/sr\], without a cosine.
 
 mod abc;
@@ -54,12 +54,12 @@ impl Lobes {
     }
 }
 
-/// Least share of a mirror lobe: off the mirror direction facets reflect even where the estimate,
-/// which looks at the normal only, is 0.
+/// Smallest weight of a specular lobe: away from the mirror direction facets reflect even where the
+/// estimate, which considers only the normal, is 0.
 const LEAST_SPECULAR: f32 = 0.01;
 
 impl Brdf {
-    /// `f_r`, \[1/sr\]: 0 unless both unit directions lie strictly on one side of the unit normal `n`.
+    /// `f_r`, \[1/sr\]: 0 unless both unit directions are strictly on the same side of the unit normal `n`.
     ///
     /// Reciprocal: exchanging `w_in` and `w_out` changes nothing.
     #[inline]
@@ -79,11 +79,11 @@ impl Brdf {
         coat::base(surface, cos_in, cos_out) + coat::fresnel(surface.specular, half.cos) * gloss
     }
 
-    /// Draws the direction that a walk does not know yet; `None` where it would go below the surface,
-    /// which is light lost to it.
+    /// Samples the direction that a walk does not know yet; `None` where it would go below the surface:
+    /// that light is lost.
     ///
-    /// `known` is `w_out` of a camera path, which draws `w_in` about by `f_r cos_in`, and `w_in` of a light
-    /// walk, which draws `w_out` about by `f_r`. `u` are uniform numbers in [0, 1]; the last one chooses the lobe.
+    /// `known` is `w_out` of a camera path, which samples `w_in` roughly by `f_r cos_in`, or `w_in` of a light
+    /// path, which samples `w_out` roughly by `f_r`. `u` are uniform numbers in [0, 1]; the last one chooses the lobe.
     #[inline]
     #[must_use]
     pub fn sample(
@@ -105,8 +105,8 @@ impl Brdf {
         }
     }
 
-    /// Density over solid angle with which [`Self::sample`] draws a direction, \[1/sr\]; its integral falls
-    /// short of 1 by the chance of `None`.
+    /// Density over solid angle with which [`Self::sample`] samples a direction, \[1/sr\]; its integral falls
+    /// short of 1 by the probability of `None`.
     #[inline]
     #[must_use]
     pub fn pdf(&self, walk: TransportMode, n: Vec3, known: Vec3, drawn: Vec3, surface: &Surface) -> f32 {
@@ -125,7 +125,7 @@ impl Brdf {
         mixed / lobes.total().max(f32::MIN_POSITIVE)
     }
 
-    /// Roughly what [`Self::sample`] passes on, for choosing between it and other lobes: never 0 where
+    /// Rough mean weight of [`Self::sample`], for choosing between this BRDF and other lobes: never 0 where
     /// [`Self::eval`] is not.
     #[inline]
     #[must_use]
@@ -133,8 +133,8 @@ impl Brdf {
         self.lobes(walk, cos_known, surface).total()
     }
 
-    /// What each lobe reflects, roughly, seen from the known direction: the largest channel, so that no
-    /// colour is drawn too rarely.
+    /// Rough reflectance of each lobe seen from the known direction: the largest channel, so that no
+    /// colour is sampled too rarely.
     #[inline]
     fn lobes(&self, walk: TransportMode, cos_known: f32, surface: &Surface) -> Lobes {
         if cos_known <= 0.0 {
@@ -151,7 +151,7 @@ impl Brdf {
         }
     }
 
-    /// Mirrors the known direction at a facet drawn about `n`, which lies on its side.
+    /// Mirrors the known direction at a facet sampled about `n`, which is on that direction's side.
     #[inline]
     fn draw_specular(&self, n: Vec3, known: Vec3, surface: &Surface, u: [f32; 2]) -> Option<Vec3> {
         let drop = match self {
@@ -165,9 +165,9 @@ impl Brdf {
     }
 }
 
-/// Draws from the diffuse lobe about `n`. In a camera path the cosine belongs to the drawn direction and
-/// is sampled with it; in a light path it belongs to the known one, and the drawn one is uniform:
-/// dividing by a drawn cosine would leave weights without a bound.
+/// Samples the diffuse lobe about `n`. In a camera path the cosine is that of the sampled direction and
+/// is sampled with it; in a light path it is that of the known one, and the sampled one is uniform:
+/// dividing by a sampled cosine would make weights unbounded.
 #[inline]
 fn draw_diffuse(walk: TransportMode, n: Vec3, u: [f32; 2]) -> Vec3 {
     let local = match walk {
@@ -186,7 +186,7 @@ fn diffuse_density(walk: TransportMode, cos_drawn: f32) -> f32 {
     }
 }
 
-/// The normal turned to the side of two directions and their cosines; `None` unless they share a side.
+/// The normal flipped to the side of two directions, and their cosines; `None` unless they share a side.
 #[inline]
 fn one_side(n: Vec3, a: Vec3, b: Vec3) -> Option<(Vec3, f32, f32)> {
     let side = 1.0_f32.copysign(n.dot(a));

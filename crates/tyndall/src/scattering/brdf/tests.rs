@@ -8,7 +8,7 @@ fn abc(b: f32, c: f32) -> Brdf {
     Brdf::Abc(Abc::new(b, c).unwrap())
 }
 
-/// Every kind, glossy ones with what shapes their lobe, from nearly mirrors to nearly flat.
+/// Every kind; glossy ones with the parameters of their lobe, from nearly mirrors to nearly flat.
 fn all_shapes() -> Vec<(Brdf, f32)> {
     let mut shapes = vec![(Brdf::Lambert, 0.5)];
     shapes.extend([0.0, 0.05, 0.1, 0.3, 0.6, 0.9, 1.0].map(|roughness| (Brdf::AshikhminShirley, roughness)));
@@ -67,8 +67,8 @@ fn the_base_reflects_what_it_claims() {
     }
 }
 
-/// Light sent straight back shows the facets' distribution, free of Fresnel's rise, and both integrate to 1 there:
-/// `D cos` of microfacets and the half-vector density of Ashikhmin and Shirley.
+/// Light reflected straight back shows the distribution of facets without Fresnel's rise. Both distributions integrate
+/// to 1: `D cos` of microfacets, and the half-vector density of Ashikhmin and Shirley.
 #[test]
 fn light_sent_back_shows_all_facets() {
     for (brdf, roughness) in all_shapes().into_iter().skip(1) {
@@ -98,7 +98,7 @@ fn ashikhmin_shirley_by_hand() {
     let w = |side: f32| Vec3::new(side * 0.75_f32.sqrt(), 0.0, 0.5);
     let across = brdf.eval(Vec3::Z, w(1.0), w(-1.0), &grey(0.0, 0.4, 1.0)).g;
     assert!((across - FRAC_1_PI / 8.0 * 0.41875 / (0.5 * 0.5)).abs() < 1e-6, "{across}");
-    // The diffuse term alone is left at a specular of 0, beside Fresnel's rise: 0 along the normal.
+    // At a specular of 0 only the diffuse term is left, and Fresnel's rise, which is 0 along the normal.
     let base = brdf.eval(Vec3::Z, Vec3::Z, Vec3::Z, &grey(0.5, 0.0, 0.5)).g;
     let expected = 28.0 * 0.5 / 23.0 * FRAC_1_PI * (31.0_f32 / 32.0).powi(2);
     assert!((base - expected).abs() < 1e-6, "{base}");
@@ -140,7 +140,7 @@ fn nothing_passes_through_or_along_a_surface() {
     }
 }
 
-/// Shape, surface and angle of incidence of a sampler's trial.
+/// Shape, surface and angle of incidence of each sampler test.
 fn trials() -> Vec<(Brdf, Surface, f32)> {
     let mut trials =
         vec![(Brdf::Lambert, grey(0.6, 0.0, 0.5), 30.0), (Brdf::Lambert, grey(0.6, 0.0, 0.5), 87.0)];
@@ -162,7 +162,7 @@ fn samplers_follow_their_densities() {
     let trials = trials();
     for walk in [TransportMode::Camera, TransportMode::Light] {
         for (brdf, surface, degrees) in &trials {
-            // The mirror direction is the pole of the cells, which finds lobes however narrow.
+            // The mirror direction is the pole of the cells, which resolves lobes however narrow.
             let n = deflect(Vec3::Z, 1.0 - degrees.to_radians().cos(), 0.1);
             let known = n * (2.0 * n.z) - Vec3::Z;
             let test =

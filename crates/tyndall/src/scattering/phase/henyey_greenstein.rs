@@ -23,7 +23,7 @@ impl HenyeyGreenstein {
         if -1.0 < g && g < 1.0 { Ok(Self { g }) } else { Err(PhaseError::MeanCosine(g)) }
     }
 
-    /// Density of turning by `cos_theta`, \[1/sr\]; also the exact pdf of [`Self::sample`].
+    /// Density of scattering at `cos_theta`, \[1/sr\]; also the exact pdf of [`Self::sample`].
     #[inline]
     #[must_use]
     pub fn eval(self, cos_theta: f32) -> f32 {
@@ -37,7 +37,7 @@ impl HenyeyGreenstein {
         self.at_drop(0.5 * (w * self.side() - after).length_squared())
     }
 
-    /// [`Self::eval_between`] of directions in lanes.
+    /// [`Self::eval_between`] of a direction before scattering per lane.
     #[inline(always)]
     pub(super) fn eval_between_lanes<S: Lanes>(self, simd: S, w: [S::f32s; 3], after: Vec3) -> S::f32s {
         let g = self.g.abs();
@@ -46,7 +46,7 @@ impl HenyeyGreenstein {
         S::f32s::splat(simd, gap * (1.0 + g) / (4.0 * PI)) / (d * d.sqrt())
     }
 
-    /// Density at `1 - cos` from the lobe's axis. There `1 + g^2 - 2 g cos` is a sum of positive terms.
+    /// Density at `1 - cos` from the lobe's axis. In that form `1 + g^2 - 2 g cos` is a sum of positive terms.
     #[inline]
     fn at_drop(self, drop: f32) -> f32 {
         let g = self.g.abs();
@@ -55,17 +55,17 @@ impl HenyeyGreenstein {
         gap * (1.0 + g) / (4.0 * PI * d * d.sqrt())
     }
 
-    /// +1 if the lobe lies ahead, -1 if behind.
+    /// +1 if the lobe is forward, -1 if backward.
     #[inline]
     fn side(self) -> f32 {
         1.0_f32.copysign(self.g)
     }
 
-    /// Draws the direction after scattering from two uniform numbers in [0, 1).
+    /// Samples the direction after scattering from two uniform numbers in [0, 1).
     ///
     /// The textbook inverse of the distribution divides by `g`. Solved for `1 - cos_theta` it factors
-    /// into `2 (1-g)^2 u (1 + g (1-u)) / (1-g + 2 g (1-u))^2`, which needs no case for `g = 0` and
-    /// loses no digit where the lobe is narrow.
+    /// into `2 (1-g)^2 u (1 + g (1-u)) / (1-g + 2 g (1-u))^2`, which needs no special case for `g = 0` and
+    /// loses no digits where the lobe is narrow.
     #[inline]
     #[must_use]
     pub fn sample(self, w: Vec3, u: [f32; 2]) -> Vec3 {

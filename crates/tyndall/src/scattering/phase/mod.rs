@@ -1,8 +1,8 @@
-//! Phase functions: how matter without a surface turns light.
+//! Phase functions: how matter without a surface scatters light.
 //!
 //! Directions follow the light: `cos_theta = w . w'` is +1 when it goes straight on. Values are
-//! densities over solid angle, \[1/sr\], and integrate to 1 over the sphere. All kinds depend on the
-//! cosine alone, so they are the same in both directions of a walk.
+//! densities over solid angle, \[1/sr\], and integrate to 1 over the sphere. All kinds depend only on the
+//! cosine, so they are the same for both directions of a walk.
 
 mod henyey_greenstein;
 mod schlick;
@@ -16,14 +16,14 @@ use crate::simd::Lanes;
 use fearless_simd::prelude::*;
 use std::f32::consts::PI;
 
-/// Why a phase function cannot be.
+/// Why a phase function is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PhaseError {
-    /// The mean cosine does not leave a lobe.
-    #[error("henyey-greenstein: g is {0}, expected -1 < g < 1; for almost straight on, use 0.999")]
+    /// The mean cosine is out of range.
+    #[error("henyey-greenstein: g is {0}, expected -1 < g < 1; for nearly straight on, use 0.999")]
     MeanCosine(f32),
-    /// The elongation does not leave a lobe.
-    #[error("schlick: k is {0}, expected -1 < k < 1; for almost straight on, use 0.999")]
+    /// The elongation is out of range.
+    #[error("schlick: k is {0}, expected -1 < k < 1; for nearly straight on, use 0.999")]
     Elongation(f32),
 }
 
@@ -35,12 +35,12 @@ pub enum Phase {
     Isotropic,
     /// One lobe, set by its mean cosine.
     HenyeyGreenstein(HenyeyGreenstein),
-    /// The rational stand-in for it.
+    /// The rational approximation of it.
     Schlick(Schlick),
 }
 
 impl Phase {
-    /// Density of turning by `cos_theta`, \[1/sr\]; also the exact pdf of [`Self::sample`].
+    /// Density of scattering at `cos_theta`, \[1/sr\]; also the exact pdf of [`Self::sample`].
     #[inline]
     #[must_use]
     pub fn eval(&self, cos_theta: f32) -> f32 {
@@ -53,8 +53,8 @@ impl Phase {
 
     /// [`Self::eval`] of two unit vectors, `w` before and `after` scattering.
     ///
-    /// Near the peak of a narrow lobe a single-precision cosine is some percent of the lobe's width off
-    /// (|g| above 0.99); the difference of the vectors is not.
+    /// Near the peak of a narrow lobe (|g| above 0.99) a single-precision cosine is off by a few percent of
+    /// the lobe's width; the difference of the vectors is not.
     #[inline]
     #[must_use]
     pub fn eval_between(&self, w: Vec3, after: Vec3) -> f32 {
@@ -65,7 +65,7 @@ impl Phase {
         }
     }
 
-    /// [`Self::eval_between`] of the directions before scattering in lanes.
+    /// [`Self::eval_between`] of a direction before scattering per lane.
     #[inline(always)]
     pub(crate) fn eval_between_lanes<S: Lanes>(&self, simd: S, w: [S::f32s; 3], after: Vec3) -> S::f32s {
         match self {
@@ -75,7 +75,7 @@ impl Phase {
         }
     }
 
-    /// Draws the direction after scattering of light that travels along the unit vector `w`,
+    /// Samples the direction after scattering of light that travels along the unit vector `w`,
     /// from two uniform numbers in [0, 1).
     #[inline]
     #[must_use]
@@ -98,7 +98,8 @@ impl Phase {
     }
 }
 
-/// Half the squared distance of directions in lanes, times `side`, from one: `1 - cos` without its rounding.
+/// `1 - cos` between each lane's direction times `side` and `after`: half their squared distance, without a cosine's
+/// rounding.
 #[inline(always)]
 fn drop_lanes<S: Lanes>(simd: S, [x, y, z]: [S::f32s; 3], side: f32, after: Vec3) -> S::f32s {
     let splat = |x: f32| S::f32s::splat(simd, x);
@@ -145,7 +146,7 @@ mod tests {
     fn samplers_follow_their_densities() {
         let kinds = all_kinds();
         for phase in &kinds {
-            // Lobes lie about the pole of the cells; then the same about a direction that is no axis.
+            // Lobes about the pole of the cells, then about a direction that is not an axis.
             for (w, least) in [(Vec3::Z, 0.0), (Vec3::new(0.48, -0.6, 0.64), 0.2)] {
                 if phase.eval(0.0) * 4.0 * PI < least {
                     continue;

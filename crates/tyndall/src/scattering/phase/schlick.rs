@@ -7,7 +7,7 @@ use crate::simd::Lanes;
 use fearless_simd::prelude::*;
 use std::f32::consts::PI;
 
-/// A lobe without a root, close to Henyey-Greenstein's \[Blasi93\]:
+/// A lobe without a square root, close to Henyey-Greenstein's \[Blasi93\]:
 /// `(1 - k^2) / (4 pi (1 - k cos_theta)^2)`; k > 0 is forward.
 ///
 /// Texts that write `1 + k cos_theta` take both directions as leaving the point; here they follow the light.
@@ -25,7 +25,7 @@ impl Schlick {
         if -1.0 < k && k < 1.0 { Ok(Self { k }) } else { Err(PhaseError::Elongation(k)) }
     }
 
-    /// Density of turning by `cos_theta`, \[1/sr\]; also the exact pdf of [`Self::sample`].
+    /// Density of scattering at `cos_theta`, \[1/sr\]; also the exact pdf of [`Self::sample`].
     #[inline]
     #[must_use]
     pub fn eval(self, cos_theta: f32) -> f32 {
@@ -39,7 +39,7 @@ impl Schlick {
         self.at_drop(0.5 * (w * self.side() - after).length_squared())
     }
 
-    /// [`Self::eval_between`] of directions in lanes.
+    /// [`Self::eval_between`] of a direction before scattering per lane.
     #[inline(always)]
     pub(super) fn eval_between_lanes<S: Lanes>(self, simd: S, w: [S::f32s; 3], after: Vec3) -> S::f32s {
         let k = self.k.abs();
@@ -48,7 +48,7 @@ impl Schlick {
         S::f32s::splat(simd, gap * (1.0 + k) / (4.0 * PI)) / (d * d)
     }
 
-    /// Density at `1 - cos` from the lobe's axis. There `1 - k cos` is a sum of positive terms.
+    /// Density at `1 - cos` from the lobe's axis. In that form `1 - k cos` is a sum of positive terms.
     #[inline]
     fn at_drop(self, drop: f32) -> f32 {
         let k = self.k.abs();
@@ -57,13 +57,13 @@ impl Schlick {
         gap * (1.0 + k) / (4.0 * PI * d * d)
     }
 
-    /// +1 if the lobe lies ahead, -1 if behind.
+    /// +1 if the lobe is forward, -1 if backward.
     #[inline]
     fn side(self) -> f32 {
         1.0_f32.copysign(self.k)
     }
 
-    /// Draws the direction after scattering from two uniform numbers in [0, 1).
+    /// Samples the direction after scattering from two uniform numbers in [0, 1).
     #[inline]
     #[must_use]
     pub fn sample(self, w: Vec3, u: [f32; 2]) -> Vec3 {

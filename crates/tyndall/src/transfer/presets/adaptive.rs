@@ -10,13 +10,13 @@ const STONE: [f32; 3] = [0.90, 0.85, 0.76];
 const WHITE: [f32; 3] = [0.97, 0.97, 0.97];
 
 /// The threshold between two classes of values by Otsu's criterion \[Otsu79\], as a share of the range:
-/// the one that separates the classes' means most, weighed by their sizes.
+/// the one that separates the classes' means most, weighted by their sizes.
 fn otsu(profile: &Profile) -> f64 {
     let counts = &profile.histogram.counts;
     let total: f64 = counts.iter().map(|&n| n as f64).sum();
     let moment: f64 = counts.iter().enumerate().map(|(i, &n)| i as f64 * n as f64).sum();
     let (mut below, mut below_moment) = (0.0, 0.0);
-    // Between well-parted classes the criterion is level: its middle is the natural threshold.
+    // Between well-separated classes the criterion is flat: the middle of the flat part is the natural threshold.
     let (mut best, mut first, mut last) = (-1.0, 0, 0);
     for (i, &n) in counts.iter().enumerate() {
         below += n as f64;
@@ -48,7 +48,7 @@ pub(super) fn is_two_phase(profile: &Profile) -> bool {
     share(low) > 0.05 && share(high) > 0.05 && share(low) + share(high) > 0.8
 }
 
-/// Keeps thresholds apart when the data have no width.
+/// Keeps thresholds distinct when the data have a single value.
 fn ascending(mut points: Vec<Point>) -> Vec<Point> {
     for i in 1..points.len() {
         let before = points[i - 1].value;
@@ -88,7 +88,7 @@ pub(super) fn solid(profile: &Profile) -> Vec<Point> {
 }
 
 pub(super) fn cloud(profile: &Profile) -> Vec<Point> {
-    // The commonest value is the background when it lies at the bottom, as it mostly does.
+    // The most common value is the background if it is near the bottom, as it usually is.
     let counts = &profile.histogram.counts;
     let mode = (0..counts.len()).max_by_key(|&i| counts[i]).unwrap_or(0) as f64 / counts.len() as f64;
     let floor = if mode < 0.3 { mode + 0.02 } else { 0.0 };
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn two_values_are_parted_in_the_middle() {
+    fn two_values_are_separated_in_the_middle() {
         let mut counts = vec![0; 256];
         (counts[0], counts[255]) = (500, 500);
         let profile = Profile { histogram: &Histogram { range: [0.0, 1.0], counts } };

@@ -61,7 +61,7 @@ impl Preset {
         PRESETS.iter().find(|preset| preset.name == name)
     }
 
-    /// The preset that suits a volume when nobody chose one.
+    /// The preset for a volume when none was chosen.
     #[must_use]
     pub fn for_volume(volume: &Volume) -> &'static Self {
         let [least, most] = volume.value_range();

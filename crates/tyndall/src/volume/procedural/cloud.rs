@@ -5,7 +5,7 @@ use crate::math::{Vec3, cast};
 const OCTAVES: u32 = 5;
 /// Lattice cells across the box in the first octave.
 const BASE: f32 = 4.0;
-/// Weight of each octave over the one before.
+/// Weight of each octave relative to the one before.
 const GAIN: f32 = 0.55;
 
 pub(super) fn value(p: Vec3, seed: u32) -> f32 {
@@ -17,7 +17,7 @@ pub(super) fn value(p: Vec3, seed: u32) -> f32 {
         noise += weight * value_noise((p + 1.0) * 0.5 * frequency, seed.wrapping_add(octave * 0x9e37));
         total += weight;
     }
-    // Centred noise, its contrast raised to fill 0..1, under a ball of radius about 0.9.
+    // Centred noise with its contrast raised to fill 0..1, plus a ball of radius about 0.9.
     let noise = (noise / total - 0.5) * 3.0;
     (0.35 * noise + 1.15 * (1.0 - p.length() / 0.9)).clamp(0.0, 0.5) * 2.0
 }

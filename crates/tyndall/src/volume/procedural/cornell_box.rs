@@ -61,7 +61,7 @@ pub(super) fn material(p: Vec3) -> u8 {
     AIR
 }
 
-/// Inside a box turned by `angle` radians about the vertical through its middle.
+/// Whether a position is inside a box turned by `angle` radians about the vertical axis through its middle.
 fn in_box(p: Vec3, middle: Vec3, half: Vec3, angle: f32) -> bool {
     let d = p - middle;
     let (sin, cos) = angle.sin_cos();

@@ -1,7 +1,7 @@
-//! Generated fields with values in 0..1, many with an exact formula: for tests, tables and trying out.
+//! Generated fields with values in 0..1, many with an exact formula: for tests, tables and experiments.
 //!
 //! A field is sampled at voxel centres. Distances are in voxels from the middle of the box; the
-//! Marschner-Lobb signal and the cloud live in `[-1, 1]^3`, stretched over the box.
+//! Marschner-Lobb signal and the cloud are defined on `[-1, 1]^3`, stretched over the box.
 
 mod cloud;
 mod cornell_box;
@@ -58,7 +58,7 @@ pub struct Field {
 }
 
 impl Field {
-    /// A field over `size` voxels; `seed` matters to the cloud alone.
+    /// A field over `size` voxels; `seed` affects only the cloud.
     #[must_use]
     pub fn new(kind: Kind, size: [usize; 3], seed: u64) -> Self {
         Self { kind, size, seed }
@@ -92,7 +92,7 @@ impl Field {
     }
 
     /// The exact gradient per voxel at index coordinates, where the field has one: `None` for the
-    /// cloud, and zero inside the flat pieces of the fields that jump.
+    /// cloud, and zero inside the constant pieces of the fields that jump.
     #[must_use]
     pub fn gradient(&self, p: Vec3) -> Option<Vec3> {
         match self.kind {
@@ -123,7 +123,7 @@ impl Field {
     /// Samples the field at the voxel centres; spacing 1, centred on the world origin.
     ///
     /// # Errors
-    /// [`GridError`] if no grid of that size can be.
+    /// [`GridError`] if a grid of that size is not possible.
     pub fn volume(&self) -> Result<Volume, GridError> {
         let grid = Grid::centred(self.size, [1.0; 3])?;
         let [nx, ny, _] = self.size;
