@@ -1,8 +1,8 @@
-//! Random damage to scene documents, patches and assignments: an answer or an error, never a panic, a hang, much
-//! memory, or a picture with numbers that are none.
+//! Random damage to scene documents, patches and assignments: a result or an error, never a panic, a hang, excessive
+//! memory, or a picture with non-finite numbers.
 //!
-//! By default each runs for two seconds; `BOLERO_RANDOM_TEST_TIME_MS` makes it longer. A failure prints the smallest
-//! damage that shows it and a seed, with which `BOLERO_RANDOM_SEED` shows it again.
+//! By default each test runs for two seconds; `BOLERO_RANDOM_TEST_TIME_MS` makes it longer. A failure prints the
+//! smallest damage that causes it and a seed, with which `BOLERO_RANDOM_SEED` reproduces it.
 
 mod scene_damage;
 
@@ -22,13 +22,13 @@ use tyndall_live::{Assets, Built};
 use tyndall_testing::damage::{Edit, NUMBERS};
 use tyndall_testing::within_limits;
 
-/// How long each runs unless the environment says otherwise.
+/// How long each test runs unless the environment says otherwise.
 const USUALLY: Duration = Duration::from_secs(2);
 
 static THREADS: LazyLock<Arc<rayon::ThreadPool>> =
     LazyLock::new(|| Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread")));
 
-/// Small volumes of several kinds: a field, anatomical and flat, a lone voxel, a vast and a tiny one, signed numbers.
+/// Small volumes of several kinds: fields, anatomical and flat, a single voxel, a vast and a tiny one, signed numbers.
 static VOLUMES: LazyLock<Vec<Arc<Volume>>> = LazyLock::new(|| {
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let turned = [[0.0, 0.0, -1.0], [0.8, 0.6, 0.0], [0.6, -0.8, 0.0]];
@@ -56,7 +56,7 @@ static MAP: LazyLock<Arc<Map>> = LazyLock::new(|| {
     Arc::new(Map::new(4, 2, texels).expect("a map"))
 });
 
-/// A scene as it may be typed.
+/// A scene document as a user might type it, errors included.
 #[derive(TypeGenerator)]
 struct Scribble {
     seed: u8,
@@ -83,7 +83,7 @@ impl Scribble {
     }
 }
 
-/// The scene itself tells more than how it came about.
+/// Shows the scene itself, which is more use than how it was generated.
 impl std::fmt::Debug for Scribble {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let volume = usize::from(self.volume) % VOLUMES.len();
@@ -91,7 +91,7 @@ impl std::fmt::Debug for Scribble {
     }
 }
 
-/// A patch on a document, and an assignment to what it makes.
+/// A patch to a document, and an assignment to the result.
 #[derive(Debug, TypeGenerator)]
 struct Correction {
     document: u8,
@@ -105,14 +105,14 @@ struct Correction {
     number: u8,
 }
 
-/// A seed after changes.
+/// A seed document after changes.
 fn changed(seed: u8, changes: &[Change]) -> Value {
     let mut value = seeds()[usize::from(seed) % seeds().len()].clone();
     changes.iter().for_each(|change| change.apply(&mut value));
     value
 }
 
-/// Reads, builds and renders; says how far it came.
+/// Reads, builds and renders a scene; on a refusal returns its message.
 fn try_scene(text: &str, json: bool, volume: Arc<Volume>) -> Result<(), String> {
     let value = if json { value_from_json(text) } else { value_from_toml(text) };
     let value = value.map_err(|e| helpful(&e))?;
@@ -121,7 +121,7 @@ fn try_scene(text: &str, json: bool, volume: Arc<Volume>) -> Result<(), String> 
     assert_eq!(document, again, "written and read again");
 
     let mut document = document;
-    // Costly is not broken: what a user may ask for at length is asked for in small here.
+    // Slow is not broken: settings that a user may choose large are kept small here.
     document.film.size = [4, 4];
     document.render.max_scatter = document.render.max_scatter.min(50);
     document.render.draft();
@@ -137,7 +137,7 @@ fn try_scene(text: &str, json: bool, volume: Arc<Volume>) -> Result<(), String> 
     Ok(())
 }
 
-/// A message fit to be read.
+/// The error's message, checked to be readable.
 fn helpful(error: &dyn std::fmt::Display) -> String {
     let message = error.to_string();
     assert!(!message.is_empty() && message.len() < 8000, "{message}");
@@ -162,7 +162,7 @@ fn a_damaged_scene_is_refused_or_rendered() {
     check!().with_type::<Scribble>().with_test_time(USUALLY).with_iterations(usize::MAX).for_each(
         |scribble| {
             let Some(text) = scribble.text() else { return };
-            // Refusals are as good as pictures.
+            // A refusal is as good as a picture.
             let _ = within_limits(|| try_scene(&text, scribble.json, scribble.volume()));
         },
     );

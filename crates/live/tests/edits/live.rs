@@ -1,4 +1,4 @@
-//! The live session: random edits, undos and redos, against sessions from nothing.
+//! The live session: random edits, undos and redos, compared with new sessions.
 
 use super::{THREADS, base, patch};
 use serde_json::{Value, json};
@@ -24,14 +24,14 @@ fn refined(live: &mut LiveSession, samples: u32) -> Image {
     live.image()
 }
 
-/// The document but for the camera, which undo leaves alone.
+/// The document without the camera, which undo leaves unchanged.
 fn without_camera(live: &LiveSession) -> Value {
     let mut document = live.document().to_value();
     document.as_object_mut().expect("a table").remove("camera");
     document
 }
 
-/// Every method of the list, so that a new one is held to it too.
+/// Runs for every method in the list, so that a new one is tested too.
 #[test]
 fn after_edits_undos_and_redos_the_picture_is_the_one_from_nothing() {
     for method in METHODS {
@@ -43,7 +43,7 @@ fn after_edits_undos_and_redos_the_picture_is_the_one_from_nothing() {
                 method.write(&method.draft(&method.default_settings())).expect("settings");
             let mut live = opened(&document);
             refined(&mut live, 2);
-            // Documents that undo and redo lead to.
+            // Documents that undo and redo must lead to.
             let (mut past, mut future) = (Vec::new(), Vec::new());
             for _ in 0..10 {
                 let before = without_camera(&live);
@@ -121,7 +121,7 @@ fn an_edit_that_fails_changes_nothing() {
         json!({ "camera": { "position": [0, 0, 9], "target": [0, 0, 9] } }),
         json!({ "film": { "size": [16384, 16384] }, "lights": [{ "type": "no-such" }] }),
     ] {
-        let error = live.edit(&bad).err().unwrap_or_else(|| panic!("{bad} is sound"));
+        let error = live.edit(&bad).err().unwrap_or_else(|| panic!("{bad} was accepted"));
         assert!(error.to_string().starts_with("edit: ") || error.to_string().contains("no-such"), "{error}");
         assert_eq!(*live.value(), value);
         assert!(live.undo().expect("nothing to undo").is_none());
@@ -138,15 +138,15 @@ fn an_edit_with_a_key_at_its_old_place_is_read_with_a_note() {
 }
 
 #[test]
-fn notes_tell_what_is_new() {
+fn only_new_notes_are_reported() {
     let mut live = opened(&base("path"));
     assert!(live.notes().is_empty(), "{:?}", live.notes());
     let clear = json!({ "transfer_function": { "points": [{ "value": 0, "opacity": 0 }] } });
     assert_eq!(live.edit(&clear).expect("an edit").notes.len(), 1);
-    assert!(live.edit(&json!({ "camera": { "fov": 20 } })).expect("an edit").notes.is_empty(), "told once");
+    assert!(live.edit(&json!({ "camera": { "fov": 20 } })).expect("an edit").notes.is_empty(), "said once");
 }
 
-/// What an edit leaves alone is shared with the scene before, and two sessions share their voxels.
+/// What an edit leaves unchanged is shared with the scene before it, and two sessions share their voxels.
 #[test]
 fn an_edit_rebuilds_only_what_it_touches() {
     let mut live = opened(&base("path"));

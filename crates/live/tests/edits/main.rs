@@ -1,4 +1,4 @@
-//! Edits against a live session: after any sequence of them, the picture is the one from nothing, bit for bit.
+//! Edits of a live session: after any sequence of them, the picture is that of a new session, bit for bit.
 
 mod live;
 mod photons;
@@ -31,7 +31,7 @@ fn scene(value: &Value) -> Scene {
         Some("nearest") => Interpolation::Nearest,
         _ => Interpolation::Linear,
     };
-    // As reloading does: the samples stay, and so the volume where nothing else asks for another.
+    // As reloading does: the voxels are shared, and so is the volume unless the interpolation differs.
     let volume = match interpolation {
         Interpolation::Linear => VOLUME.clone(),
         Interpolation::Nearest => Arc::new((**VOLUME).clone().with_interpolation(interpolation)),
@@ -58,7 +58,7 @@ fn base(integrator: &str) -> Value {
     })
 }
 
-/// An edit of any kind that a document knows, with random numbers in it.
+/// A random edit of any kind that a document allows, with random numbers in it.
 fn patch(random: &mut SplitMix, document: &Value) -> Value {
     let mut u = || cast::single(random.uniform());
     let which = cast::index(u() * 22.0);
@@ -93,7 +93,7 @@ fn patch(random: &mut SplitMix, document: &Value) -> Value {
             points[i]["roughness"] = u().into();
             edited(points)
         }
-        // Beyond all data: nothing that is read.
+        // A point beyond all data values, which nothing reads.
         7 => {
             let mut all: Vec<Value> = points.as_array().cloned().unwrap_or_default();
             let last = all[count - 1].clone();
@@ -120,11 +120,12 @@ fn patch(random: &mut SplitMix, document: &Value) -> Value {
             json!({ "lights": lights })
         }
         14 => {
-            // Their numbers change, and with them which light is drawn when; or one moves, or the last goes for a while.
+            // The lights' indices change, and with them which light a random number selects; or one moves, or the last
+            // one is removed for a while.
             let lights = lights.as_array_mut().expect("a list");
             match cast::index(u() * 4.0) {
                 0 => lights.rotate_left(1),
-                // By which photons draw their numbers.
+                // The name determines the random numbers of the light's photons.
                 1 => lights[0]["name"] = ["sun", "bulb", "lamp"][cast::index(u() * 3.0)].into(),
                 2 => lights
                     .iter_mut()
@@ -153,7 +154,7 @@ fn refined(session: &mut Session, samples: u32) -> Image {
     session.image()
 }
 
-/// Works for so short a time that most often nothing comes to an end.
+/// Refines for so short a time that usually nothing is completed.
 fn refined_a_little(session: &mut Session, random: &mut SplitMix) {
     let moment = Duration::from_micros(if random.uniform() < 0.5 { 0 } else { random.bits() % 3000 });
     session.refine(&Budget { deadline: Some(Instant::now() + moment), ..Budget::samples(2) });
@@ -175,7 +176,7 @@ fn after_any_edits_the_picture_is_the_one_from_nothing() {
             live.set_scene(scene(&value));
             let found = refined(&mut live, 2);
             let expected = refined(&mut Session::new(scene(&value), THREADS.clone()), 2);
-            assert!(found == expected, "round {round}: another picture after {edits:?}");
+            assert!(found == expected, "round {round}: a different picture after {edits:?}");
             let [WorkShare { name, share }] = live.recomputed()[..] else {
                 panic!("{:?}", live.recomputed())
             };
@@ -183,15 +184,15 @@ fn after_any_edits_the_picture_is_the_one_from_nothing() {
             *(if share == 0.0 { &mut kept } else { &mut redone }) += 1;
         }
     }
-    assert!(kept > 20 && redone > 150, "{kept} edits left the picture, {redone} did not");
+    assert!(kept > 20 && redone > 150, "{kept} edits kept the picture, {redone} did not");
 }
 
-/// Photons and segments of the base map, which alone live through an edit, and a refinement pass after it. Some edits come
-/// while the work for those before is still under way.
+/// Tests photons and segments of the base map, which alone are kept through an edit, and a refinement pass after it.
+/// Some edits come while the work for earlier ones is still under way.
 #[test]
 fn after_any_edits_photons_and_segments_are_those_from_nothing() {
     let mut random = SplitMix::new(4);
-    // Edits that redid nothing, some, or all of the photons, and of the segments.
+    // Numbers of edits that redid none, some, or all of the photons, and of the segments.
     let mut redone = [[0; 3]; 2];
     for round in 0..400 {
         let mut value = base("photon");
@@ -224,7 +225,7 @@ fn after_any_edits_photons_and_segments_are_those_from_nothing() {
                 continue;
             }
             let mut fresh = Session::new(scene(&value), THREADS.clone());
-            // A picture that the edit left may have its refinement pass already, or half of it.
+            // A picture that the edit left unchanged may already have its refinement pass, or half of it.
             let found = refined(&mut live, 1);
             let samples = live.film().samples();
             let even = live.film().mean_samples() == f64::from(samples);
@@ -245,7 +246,7 @@ fn after_any_edits_photons_and_segments_are_those_from_nothing() {
             assert!(refined(&mut live, 2) == refined(&mut fresh, 2), "round {round}: a pass after {edits:?}");
         }
     }
-    // Rays that miss the volume have segments too, which nothing redoes.
+    // Rays that miss the volume have segments too, which are never redone.
     let [photons, [none, some, _]] = redone;
     assert!(photons.iter().chain([&none, &some]).all(|&n| n > 20), "{redone:?}");
 }
@@ -280,7 +281,7 @@ fn a_difference_names_what_changed_and_nothing_else() {
     let camera = difference(&before, &json!({ "camera": { "fov": 20 } }));
     assert!(camera.camera && camera.view() && !camera.light());
 
-    // A camera and lights that fit the volume are others for another size alone where they have to be.
+    // Another picture size changes an automatic camera and lights only where it must.
     let size = difference(&before, &json!({ "film": { "size": [38, 34] } }));
     assert!(size.size && !size.light());
 }
@@ -305,7 +306,7 @@ fn lights_are_matched_by_name_then_by_number() {
     let mut dim = sun.clone();
     dim["irradiance"] = json!([1, 1, 1]);
     assert_eq!(origins(vec![dim.clone(), bulb.clone()]), (vec![Changed(0), Same(2)], vec![1]));
-    // The third has no name, and the old third is still there under its own.
+    // The third light now has no name, and the old third light is still there under its own name.
     dim["name"] = Value::Null;
     dim.as_object_mut().unwrap().remove("name");
     assert_eq!(origins(vec![sun, bulb, dim]), (vec![Same(0), Same(2), New], vec![1]));

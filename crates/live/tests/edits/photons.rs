@@ -1,11 +1,12 @@
-//! Edits of `photon` that touch little, each where something could be overlooked.
+//! Edits under `photon` that affect little, each in a case where a change could be overlooked.
 
 use super::{THREADS, base, refined, scene};
 use serde_json::{Value, json};
 use tyndall::session::Session;
 use tyndall_testing::SplitMix;
 
-/// Edits a session to a document by which some segments change and others do not, to the picture from nothing.
+/// Edits a session to another document. Some segments must change and others not, and the picture must be that of a
+/// new session.
 #[track_caller]
 fn assert_some_segments_change(live: &mut Session, value: &Value, name: &str) {
     live.set_scene(scene(value));
@@ -15,7 +16,8 @@ fn assert_some_segments_change(live: &mut Session, value: &Value, name: &str) {
     assert!(found == refined(&mut Session::new(scene(value), THREADS.clone()), 1), "{name}");
 }
 
-/// Edits a session of a document from one number to others, by the points of a transfer function that each stands for.
+/// Edits a session through several numbers, each of which gives the points of a transfer function, and checks each edit
+/// as above.
 #[track_caller]
 fn assert_each_changes_some(
     value: &mut Value,
@@ -27,11 +29,11 @@ fn assert_each_changes_some(
     refined(&mut live, 1);
     for number in others {
         value["transfer_function"]["points"] = points(number);
-        assert_some_segments_change(&mut live, value, &format!("{number} in place of {first}"));
+        assert_some_segments_change(&mut live, value, &format!("{number} instead of {first}"));
     }
 }
 
-/// Of many photons a few come and go, which moves sums by little where it moves them.
+/// A few of many photons come and go, which changes only some sums, and those only slightly.
 #[test]
 fn few_of_many_photons_change_the_sums_beside_them() {
     let mut random = SplitMix::new(7);
@@ -41,7 +43,7 @@ fn few_of_many_photons_change_the_sums_beside_them() {
         value["film"]["size"] = json!([48, 40]);
         value["render"]["max_scatter"] = 2.into();
         value["medium"]["majorant_cell"] = 1.into();
-        // Glowing matter would start all its photons anew.
+        // Emissive matter would have all its photons traced again.
         value["transfer_function"]["points"][2]["emission"] = 0.into();
         let estimate = ["point", "beam", "nearest"][round % 3];
         let spatial = ["cells", "axes"][round / 3 % 2];
@@ -51,14 +53,14 @@ fn few_of_many_photons_change_the_sums_beside_them() {
         let mut live = Session::new(scene(&value), THREADS.clone());
         refined(&mut live, 1);
         for _ in 0..3 {
-            // Where a little less survives, a photon here and there goes.
+            // With a slightly lower probability of survival, a few photons disappear.
             value["transfer_function"]["points"][2]["albedo"] = (0.9 - 0.01 * random.uniform()).into();
             assert_some_segments_change(&mut live, &value, &format!("round {round}: {estimate}, {spatial}"));
         }
     }
 }
 
-/// In thin fog the slices of beams reach far along the ray.
+/// In thin fog, the slices of beams extend far along the ray.
 #[test]
 fn wide_slices_ask_for_all_that_they_gather() {
     let mut value = base("photon");
@@ -79,7 +81,7 @@ fn wide_slices_ask_for_all_that_they_gather() {
     assert_each_changes_some(&mut value, points, [0.5, 0.49, 0.5, 0.48]);
 }
 
-/// A little more or less opacity moves hardly any photon, but each weighs more or less where it lies beside thinner matter.
+/// A slight change of opacity moves hardly any photon, but changes the weight of each that is next to thinner matter.
 #[test]
 fn photons_that_stay_in_matter_that_changes() {
     let mut value = base("photon");
@@ -93,12 +95,12 @@ fn photons_that_stay_in_matter_that_changes() {
     assert_each_changes_some(&mut value, points, [0.5, 0.5001, 0.4999, 0.5003]);
 }
 
-/// A flight depends on the majorant of a cell also where it meets none of the values that raise or lower it.
+/// A free flight depends on the majorant of a cell even if it meets none of the values that raise or lower it.
 #[test]
 fn majorants_that_few_values_raise_and_lower() {
     let mut value = base("photon");
     let point = |value: f64, opacity: f64| json!({ "value": value, "opacity": opacity });
-    // A peak that most cells' majorants come from, and a band that few cells have.
+    // A peak that determines most cells' majorants, and a band of values that few cells contain.
     let band = |opacity: f64| {
         let peak = [point(0.3, 0.2), point(0.4, 0.6), point(0.41, 0.6), point(0.45, 0.2)];
         let band = [point(0.65, 0.2), point(0.66, opacity), point(0.68, opacity), point(0.69, 0.2)];
@@ -119,7 +121,7 @@ fn majorants_that_few_values_raise_and_lower() {
     }
 }
 
-/// What an edit changed is not forgotten over the next one, when no picture was made between them.
+/// What an edit changed is not forgotten at the next one if no picture was made between them.
 #[test]
 fn edits_that_follow_each_other_without_a_picture() {
     let mut value = base("photon");
@@ -127,7 +129,7 @@ fn edits_that_follow_each_other_without_a_picture() {
     let points = |[low, high]: [f64; 2]| json!([point(0.0, low), point(0.4, low), point(0.4, high)]);
     value["volume"] =
         json!({ "procedural": { "kind": "shells", "size": [20, 20, 20] }, "interpolation": "nearest" });
-    // No photon comes or goes, so that segments hear of edits by the values alone.
+    // No photon comes or goes, so that segments learn of edits only from the values.
     value["render"]["max_scatter"] = 1.into();
     value["render"]["photon"] = json!({ "photons": 3000, "segments": 20, "radius": 0.5 });
     value["transfer_function"]["points"] = points([0.9, 0.9]);
@@ -143,13 +145,14 @@ fn edits_that_follow_each_other_without_a_picture() {
     }
 }
 
-/// Where a light goes, the others have more paths, each of which stands for less.
+/// When a light is removed, the others get more paths, each of which carries less flux.
 #[test]
 fn paths_that_stay_among_more_weigh_less() {
     let mut value = base("photon");
     value["film"]["size"] = json!([48, 40]);
     value["render"]["max_scatter"] = 1.into();
-    // Paths of three lights and the glow stay in blocks of 65,536 each. Few cells of a small radius hold photons of two lights.
+    // Paths of the three lights and of the emission are kept in blocks of 65,536 each. With a small radius, few cells
+    // hold photons of two lights.
     value["render"]["photon"] = json!({ "photons": 280_000, "segments": 20, "radius": 0.1 });
     let mut live = Session::new(scene(&value), THREADS.clone());
     refined(&mut live, 1);
@@ -161,7 +164,7 @@ fn paths_that_stay_among_more_weigh_less() {
     assert!(found == refined(&mut Session::new(scene(&value), THREADS.clone()), 1));
 }
 
-/// Lights keep their numbers by their names, and photons are added up by these, not by the document's order.
+/// A light's random numbers, and its place in the sum of photons, follow from its name, not from the document's order.
 #[test]
 fn the_order_of_named_lights_moves_no_photon() {
     let mut value = base("photon");
@@ -176,7 +179,7 @@ fn the_order_of_named_lights_moves_no_photon() {
     assert!(refined(&mut Session::new(scene(&value), THREADS.clone()), 1) == before);
 }
 
-/// A light's numbers follow its name: another name, other paths, of that light alone.
+/// A light's random numbers follow from its name: another name gives that light, and no other, different paths.
 #[test]
 fn a_light_by_another_name_sends_other_photons() {
     let mut value = base("photon");
@@ -196,7 +199,7 @@ fn a_light_by_another_name_sends_other_photons() {
     }
 }
 
-/// How wide a beam's slices may be follows from the steps, and these from density.
+/// The largest width of a beam's slices follows from the steps, and the steps follow from the density.
 #[test]
 fn slices_that_an_edit_of_density_widens_ask_for_all_that_they_gather() {
     let mut value = base("photon");

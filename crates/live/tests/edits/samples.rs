@@ -1,4 +1,4 @@
-//! Samples of `path` that are kept through edits with what they depend on.
+//! Samples of `path` that are kept through edits, together with what they depend on.
 
 use super::{THREADS, base, patch, refined, refined_a_little, scene};
 use serde_json::{Value, json};
@@ -16,18 +16,18 @@ fn keeping(value: &Value, bytes: usize) -> Session {
     Session::with_resources(scene(value), THREADS.clone(), resources)
 }
 
-/// The share of samples that an edit takes again.
+/// The fraction of samples that are taken again after an edit.
 fn share_after(live: &mut Session, value: &Value) -> f64 {
     live.set_scene(scene(value));
     refined(live, 2);
     live.recomputed()[0].share
 }
 
-/// Some edits come while the work for those before is still under way; some sessions keep fewer samples than there are.
+/// Some edits come while the work for earlier ones is still under way; some sessions can keep only part of the samples.
 #[test]
 fn after_any_edits_samples_are_those_from_nothing() {
     let mut random = SplitMix::new(7);
-    // Edits that redid nothing, some, or all of the samples.
+    // Numbers of edits that redid none, some, or all of the samples.
     let mut redone = [0; 3];
     for round in 0..400 {
         let mut value = base("path");
@@ -36,7 +36,7 @@ fn after_any_edits_samples_are_those_from_nothing() {
             value["transfer_function"]["points"][0]["value"] = 0.35.into();
         }
         if round % 3 == 0 {
-            // A lone light is always drawn, and nothing glows.
+            // A single light, which is always the one selected, and no emission.
             value["lights"] = json!([value["lights"][round / 3 % 3]]);
             value["transfer_function"]["points"][2]["emission"] = json!([0, 0, 0]);
         }
@@ -103,7 +103,7 @@ fn edits_take_again_what_they_touched() {
     assert!((forward - met).abs() < 0.05, "{forward} of {met}");
     let behind = share("film", film(0.5));
     assert!((behind - (1.0 - met)).abs() < 0.05, "{behind} of {met}");
-    // The sky is hidden by then.
+    // By now the background colour hides the sky.
     let light =
         share("lights", json!([{ "type": "point", "position": [30, 0, 0], "intensity": [900, 900, 900] }]));
     assert!((light - met).abs() < 0.05, "{light} of {met}");
@@ -111,7 +111,8 @@ fn edits_take_again_what_they_touched() {
     assert_eq!(share("clip", json!([{ "type": "plane", "point": [0, 0, 0], "normal": [1, 0, 0] }])), 1.0);
 }
 
-/// Where all is matter, a narrow band of values becomes the thinnest of some cells, or the densest, and of others does not.
+/// Without empty space: a narrow band of values becomes the smallest or the largest opacity of some cells, and not of
+/// others.
 #[test]
 fn limits_that_few_values_move() {
     let mut value = base("path");
@@ -144,7 +145,7 @@ fn limits_that_few_values_move() {
     }
 }
 
-/// Its chance is 1 whatever it sends.
+/// A single light is selected with probability 1, whatever it emits.
 #[test]
 fn a_lone_light_that_turns() {
     let mut value = base("path");

@@ -1,4 +1,4 @@
-//! Scenes that say everything once, and changes to them that keep their shape.
+//! Scene documents that together use every key, and changes to them that keep them well-formed.
 
 use bolero::TypeGenerator;
 use serde_json::{Value, json};
@@ -109,10 +109,10 @@ pub fn words() -> &'static [&'static str] {
     &WORDS
 }
 
-/// A change to a value; places count modulo what there is.
+/// A change to a value; indices are taken modulo the number of candidates.
 #[derive(Clone, Debug, TypeGenerator)]
 pub enum Change {
-    /// Another number, of the list below.
+    /// Another number, from the list below.
     Number { at: u16, number: u8 },
     /// Any number at all.
     Float { at: u16, bits: u64 },
@@ -122,17 +122,17 @@ pub enum Change {
     Word { at: u16, word: u16 },
     /// Something of another type.
     Type { at: u16, which: u8 },
-    /// A copy of what stands elsewhere.
+    /// A copy of a value from elsewhere.
     Copy { from: u16, to: u16 },
     /// A key or item left out.
     Remove { at: u16, which: u8 },
-    /// A key of another name.
+    /// A key renamed.
     Rename { at: u16, which: u8, word: u16 },
-    /// A list with its items again.
+    /// A list with its items repeated.
     Repeat { at: u16, times: u8 },
 }
 
-/// Numbers at the edges of what the document takes.
+/// Numbers at the limits of what the document accepts.
 const NUMBERS: [f64; 30] = [
     0.0,
     -0.0,
@@ -172,7 +172,7 @@ impl Change {
         match *self {
             Self::Number { at, number } => {
                 let number = NUMBERS[usize::from(number) % NUMBERS.len()];
-                // A whole number as one, as users type it; `0` in the format keeps all digits.
+                // A whole number becomes an integer, as users type it; the format `.0` keeps all digits.
                 let whole = format!("{number:.0}").parse::<i64>().ok().filter(|_| number.fract() == 0.0);
                 let number = whole.map_or(json!(number), |whole| json!(whole));
                 replace(value, at, number, Value::is_number);
@@ -231,7 +231,7 @@ fn is_filled(value: &Value) -> bool {
 }
 
 fn replace(value: &mut Value, at: u16, new: Value, wanted: impl Fn(&Value) -> bool + Copy) {
-    // A copy of the whole inside itself, again and again, would only grow.
+    // Repeatedly copying the whole into itself would only make it grow.
     let small = |value: &Value| count(value, |_| true) < 5000;
     if small(value)
         && let Some(place) = nth(value, at, wanted)
@@ -249,7 +249,7 @@ fn count(value: &Value, wanted: impl Fn(&Value) -> bool + Copy) -> usize {
     below + usize::from(wanted(value))
 }
 
-/// The place of that number, modulo how many there are, among those wanted.
+/// The place with index `at`, modulo how many there are, among those wanted.
 fn nth(value: &mut Value, at: u16, wanted: impl Fn(&Value) -> bool + Copy) -> Option<&mut Value> {
     fn find<'a>(
         value: &'a mut Value,
