@@ -1,7 +1,7 @@
 //! Free flight and transmittance through inhomogeneous matter.
 //!
 //! Both walk the cells of the [`MajorantGrid`](super::MajorantGrid), which holds the smallest and the
-//! largest extinction of each. Where these are equal the cell is homogeneous and nothing is looked up. A step too
+//! largest extinction of each. Where these are equal the cell is homogeneous, and transmittance looks nothing up. A step too
 //! short for single precision still advances by one unit in the last place, so that no flight gets stuck.
 
 use super::{CellStretch, Medium, Track};

@@ -71,7 +71,7 @@ pub(super) fn value_range(voxels: &Voxels, values: ValueMap) -> [f64; 2] {
 /// Share of the samples cut off at each end of the robust range.
 const OUTLIERS: f64 = 0.001;
 
-/// At most this many samples, evenly strided, decide the robust range: their quantiles are within
+/// At most twice this many samples, evenly strided, decide the robust range: their quantiles are within
 /// 0.01 % of the share, and sorting them takes negligible time compared to loading.
 const SURVEYED: usize = 1 << 20;
 

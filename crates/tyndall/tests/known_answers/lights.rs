@@ -71,7 +71,7 @@ fn irradiances_have_closed_forms() {
     // A cone entirely above the horizon gives the irradiance of the sharp light, whatever its angle.
     check(Light::Directional(Directional::new(-up, Rgb::splat(2.0), 60.0)), 2.0);
     check(Light::Environment(Environment::constant(Rgb::splat(0.7), true)), 0.7 * PI);
-    // A facing square: 4 F of one quarter of it, F = 2/pi a/sqrt(1+a^2) atan(b/sqrt(1+a^2)) with a = b.
+    // A facing square: 4 F of one quarter of it, F = 1/pi a/sqrt(1+a^2) atan(b/sqrt(1+a^2)) with a = b.
     let a = 0.5_f64;
     let quarter = a / (1.0 + a * a).sqrt() * (a / (1.0 + a * a).sqrt()).atan() / PI;
     check(

@@ -34,7 +34,7 @@ pub(super) fn range() -> [f32; 2] {
     [MATERIALS[0].value, MATERIALS[6].value]
 }
 
-/// Half the thickness of the walls, of a room from -1 to 1.
+/// Thickness of the walls of a room from -1 to 1.
 const WALL: f32 = 0.06;
 
 /// The material at a position of `[-1, 1]^3`: +y is up, the open side faces +z.
