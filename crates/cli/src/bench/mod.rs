@@ -164,6 +164,9 @@ fn markdown(title: &str, rows: &[Row]) -> String {
 /// Measures the rows of one table with the given vector instructions.
 type Table = fn(&timing::Effort, Level) -> Result<Vec<Row>, Failure>;
 
+/// The same, for tables that depend on the command line.
+type Measure<'a> = dyn Fn(&timing::Effort, Level) -> Result<Vec<Row>, Failure> + 'a;
+
 const CORE: &[Table] = &[
     core::sampling,
     core::flight,
@@ -192,7 +195,7 @@ pub fn run(options: &BenchOptions) -> Result<(), Failure> {
     let effort = timing::Effort::new(options.quick);
     let mut all = Vec::new();
     let edits = |effort: &timing::Effort, level| looks::edits(effort, level, &options.files);
-    let looks: [&dyn Fn(&timing::Effort, Level) -> Result<Vec<Row>, Failure>; 2] = [&edits, &looks::look];
+    let looks: [&Measure; 2] = [&edits, &looks::look];
     let fixed = |tables: &'static [Table]| tables.iter().map(|table| table as _);
     let tables: Vec<_> = match options.name {
         BenchName::Core => fixed(CORE).collect(),

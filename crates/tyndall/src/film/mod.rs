@@ -318,8 +318,9 @@ mod tests {
         let mut turn = 0_u32;
         for tile in film.tiles_mut() {
             turn += 1;
-            let more = if turn.is_multiple_of(3) { tile.pixel_count() as u32 / 2 } else { 0 };
-            let all = (samples + turn % 3) * tile.pixel_count() as u32 + more;
+            let pixels = cast::fit_u32(tile.pixel_count());
+            let more = if turn.is_multiple_of(3) { pixels / 2 } else { 0 };
+            let all = (samples + turn % 3) * pixels + more;
             for i in 0..all {
                 let x = (i.wrapping_mul(2_654_435_769).wrapping_add(turn) >> 8) as f32 / (1 << 22) as f32;
                 tile.add(&PixelSample { radiance: Rgb::new(x, 2.0 - x, 0.3 * x), alpha: 1.0, depth: 1.0 });

@@ -227,6 +227,7 @@ impl SampleTile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::cast;
     use crate::sampling::Stream;
     use crate::transfer::Historygram;
 
@@ -242,7 +243,7 @@ mod tests {
             // What each sample depends on, and whether an edit has touched it since it was taken.
             let mut model: Vec<(Past, bool)> = Vec::new();
             for _ in 0..edits {
-                let reach = (stream.uniform() * (SAMPLES + 1) as f32) as usize;
+                let reach = cast::index(stream.uniform() * (SAMPLES + 1) as f32);
                 for i in 0..reach.min(model.len() + 5) {
                     let group = |stream: &mut Stream| Historygram::from_bits(1 << (stream.bits() % 20));
                     if let Some(sample) = tile.get(i) {
@@ -258,9 +259,9 @@ mod tests {
                         let radiance = Rgb::splat(i as f32);
                         tile.put(i, &PixelSample { radiance, ..PixelSample::default() }, &past, SAMPLES);
                         if i < model.len() {
-                            model[i] = (past, false)
+                            model[i] = (past, false);
                         } else {
-                            model.push((past, false))
+                            model.push((past, false));
                         }
                         retaken += 1;
                     }
