@@ -238,13 +238,14 @@ mod tests {
         const SAMPLES: usize = 40;
         let mut stream = Stream::new(3, [0; 3]);
         let (mut found, mut retaken) = (0, 0);
-        for edits in [3, 8, 40] {
+        // Fewer edits than queries may wait are never merged.
+        for edits in [MOST_PENDING; 30].into_iter().chain([60; 3]) {
             let mut tile = SampleTile::default();
             // What each sample depends on, and whether an edit has touched it since it was taken.
             let mut model: Vec<(Past, bool)> = Vec::new();
             for _ in 0..edits {
                 let reach = cast::index(stream.uniform() * (SAMPLES + 1) as f32);
-                for i in 0..reach.min(model.len() + 5) {
+                for i in 0..reach {
                     let group = |stream: &mut Stream| Historygram::from_bits(1 << (stream.bits() % 20));
                     if let Some(sample) = tile.get(i) {
                         assert!(!model[i].1, "sample {i} is out of date");
