@@ -266,6 +266,7 @@ fn an_option_at_fault_is_named() {
         (vec!["paint"], "'paint'"),
         (vec!["completions", "no-such"], "'no-such'"),
         (vec!["presets", "all"], "'all'"),
+        (vec!["bench", "core", "a.nrrd"], "only `looks`"),
     ] {
         Fault { files: Vec::new(), arguments, status: 2, says: vec![says] }.check();
     }
@@ -290,6 +291,13 @@ fn a_value_set_to_something_invalid_is_the_inputs_fault() {
         ("volume.path=no-such.nrrd", "no-such.nrrd"),
     ] {
         options(&["--set", assignment], 1, &[key]);
+    }
+    for (assignment, says) in [
+        (r#"camera={"position":[0,0,0]}"#, "is also the target"),
+        (r#"camera={"position":[0,0,1e30]}"#, "1e30 from the target; expected 1e-15 to 1e15"),
+        (r#"camera={"position":[1e12,0,0],"target":[1e12,0,1]}"#, "1e0 from the target, too little"),
+    ] {
+        options(&["--set", assignment], 1, &["camera.position", says]);
     }
     options(&["--size", "1000000x1000000"], 1, &["film.size", "pixels"]);
 }

@@ -4,6 +4,7 @@ use crate::assets::Assets;
 use crate::document::{self, Document};
 use rayon::ThreadPool;
 use std::fmt::Display;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use tyndall::camera::{AutoView, Camera, FitLens, Lens, fit};
 use tyndall::light::{
@@ -32,6 +33,9 @@ const DENSEST: f32 = 1000.0;
 
 /// Positions farther from the volume's centre than this leave no headroom in single precision.
 const FARTHEST: f32 = 1e18;
+
+/// Distances of a camera from its target whose squares single precision holds.
+const DISTANCES: RangeInclusive<f64> = 1e-15..=1e15;
 
 fn fault(path: impl Into<String>, problem: impl Display) -> SceneError {
     SceneError { path: path.into(), problem: problem.to_string() }
@@ -318,10 +322,22 @@ fn camera(document: &Document, volume: &Volume) -> Result<Camera, SceneError> {
     let (position, given_target) = (grid.to_world(given_position), given.target().unwrap_or(grid.center()));
     let target = grid.to_world(given_target);
     let view = target - position;
-    if view.length() <= 1e-6 * position.length() || view.length() == 0.0 {
-        let problem =
-            format!("{given_position:?} is also the target; expected two positions: move one of them");
-        return Err(fault("camera.position", problem));
+    let distance = DVec3::from_array(given_position).distance(DVec3::from_array(given_target));
+    let problem = if distance == 0.0 {
+        Some("is also the target; expected two positions: move one of them".to_owned())
+    } else if !DISTANCES.contains(&distance) {
+        let [least, most] = [DISTANCES.start(), DISTANCES.end()];
+        Some(format!("is {distance:e} from the target; expected {least:e} to {most:e}: move one of them"))
+    } else if view.length() <= 1e-6 * position.length() {
+        Some(format!(
+            "is {distance:e} from the target, too little to be seen in single precision so far from the volume; \
+             expected them farther apart or nearer to the volume"
+        ))
+    } else {
+        None
+    };
+    if let Some(problem) = problem {
+        return Err(fault("camera.position", format!("{given_position:?} {problem}")));
     }
     let up = up.unwrap_or_else(|| {
         let up = grid.space().up();
