@@ -79,7 +79,7 @@ fn as_text(volume: &Volume, source: &Source) -> String {
     let [lo, hi] = volume.value_range();
     let [robust_lo, robust_hi] = volume.robust_range();
     let corners = grid.file_bounds();
-    let size: [f64; 3] = std::array::from_fn(|axis| corners[1][axis] - corners[0][axis]);
+    let size = grid.file_extent();
     let mut text = format!(
         "voxels     {nx} x {ny} x {nz} of {}\n\
          spacing    {sx} x {sy} x {sz}\n\

@@ -191,6 +191,12 @@ const HISTORYGRAMS: &[Table] = &[
 
 /// Measures the tables and prints each as soon as it is complete, or all at the end as JSON.
 pub fn run(options: &BenchOptions) -> Result<(), Failure> {
+    if let (BenchName::Core | BenchName::Historygrams, Some(file)) = (options.name, options.files.first()) {
+        let file = tyndall::message::path_name(file);
+        return Err(Failure::usage(format!(
+            "{file}: only `looks` measures files; name it, or leave the file out"
+        )));
+    }
     let level = crate::machine::vector_instructions()?;
     let effort = timing::Effort::new(options.quick);
     let mut all = Vec::new();

@@ -11,7 +11,7 @@ pub mod tone;
 pub use look::{Tone, Viewer};
 pub use tile::{Goal, Stride, TILE, Tile};
 
-use crate::math::{Rgb, cast};
+use crate::math::{LUMINANCE, Rgb, cast};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use tile::{Order, PixelEstimate, bytes_of_pixel};
@@ -28,7 +28,8 @@ pub struct PixelSample {
 }
 
 fn luminance_of([r, g, b]: [f64; 3]) -> f64 {
-    0.2126 * r + 0.7152 * g + 0.0722 * b
+    let [red, green, blue] = LUMINANCE.map(f64::from);
+    red * r + green * g + blue * b
 }
 
 /// A picture being rendered.

@@ -2,16 +2,11 @@
 //!
 //! A curve is for display only; the film records linear radiance.
 
-use crate::math::Rgb;
+use crate::math::{LUMINANCE, Rgb};
 use crate::simd::MOST_LANES;
 use crate::simd::{Kernel, Lanes, Level, exp2_unfused, log2_unfused};
 use fearless_simd::prelude::*;
 use std::ops::{Add, Div, Mul};
-
-/// Luminance of Rec. 709 primaries, as of [`Rgb::luminance`].
-const RED: f32 = 0.2126;
-const GREEN: f32 = 0.7152;
-const BLUE: f32 = 0.0722;
 
 /// How unbounded radiance is compressed into the range of a display.
 ///
@@ -101,7 +96,8 @@ impl<C: Code> Kernel for Encode<'_, C> {
                 ToneCurve::Agx => agx(simd, [r, g, b]),
                 ToneCurve::Linear => encode_all(simd, [r, g, b]),
                 ToneCurve::Reinhard => {
-                    let white = r * RED + g * GREEN + b * BLUE + 1.0;
+                    let [red, green, blue] = LUMINANCE;
+                    let white = r * red + g * green + b * blue + 1.0;
                     encode_all(simd, [r / white, g / white, b / white])
                 }
                 ToneCurve::Aces => encode_all(simd, [aces(r), aces(g), aces(b)]),

@@ -3,6 +3,9 @@
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Sub};
 
+/// What red, green and blue of Rec. 709 primaries contribute to luminance.
+pub const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
+
 /// A linear RGB triple: radiance, irradiance, albedo or weight, depending on the context.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -46,7 +49,8 @@ impl Rgb {
     #[inline]
     #[must_use]
     pub fn luminance(self) -> f32 {
-        0.2126 * self.r + 0.7152 * self.g + 0.0722 * self.b
+        let [r, g, b] = LUMINANCE;
+        r * self.r + g * self.g + b * self.b
     }
 
     /// The largest channel.

@@ -8,7 +8,7 @@ pub mod frame;
 pub mod ray;
 
 pub use bounds::Bounds;
-pub use color::Rgb;
+pub use color::{LUMINANCE, Rgb};
 pub use direction::PackedDirection;
 pub use frame::Frame;
 pub use glam::{Affine3A, DMat3, DVec3, Mat3, Vec2, Vec3};

@@ -173,12 +173,16 @@ impl Grid {
     /// coordinates.
     #[must_use]
     pub fn file_bounds(&self) -> [[f64; 3]; 2] {
-        // Half the box's extent along an axis: what its three edges contribute.
-        let half = |axis: usize| -> f64 {
-            let edge = |a: usize| self.direction[axis][a] * self.spacing[a] * self.dims[a] as f64;
-            0.5 * (0..3).map(|a| edge(a).abs()).sum::<f64>()
-        };
-        [-1.0, 1.0].map(|side| std::array::from_fn(|axis| self.center[axis] + side * half(axis)))
+        let extent = self.file_extent();
+        [-0.5, 0.5].map(|side| std::array::from_fn(|axis| self.center[axis] + side * extent[axis]))
+    }
+
+    /// Edges of that box: not the difference of its corners, which far from the origin are rounded.
+    #[must_use]
+    pub fn file_extent(&self) -> [f64; 3] {
+        // What the three edges of the medium's box contribute along an axis.
+        let edge = |axis: usize, a: usize| self.direction[axis][a] * self.spacing[a] * self.dims[a] as f64;
+        std::array::from_fn(|axis| (0..3).map(|a| edge(axis, a).abs()).sum())
     }
 
     /// What the axes mean.
@@ -281,6 +285,7 @@ mod tests {
         let p = Vec3::new(0.3, 4.0, 2.5);
         assert_eq!(grid.index_to_world(p), near.index_to_world(p));
         assert_eq!(grid.to_world([far[0] + 0.25, far[1], far[2] - 0.5]), near.to_world([0.25, 0.0, -0.5]));
+        assert_eq!(grid.file_extent(), [1.0, 1.25, 1.5]);
         assert_eq!(grid.file_bounds(), [far.map(|x| x - 0.125), [8e7 + 0.875, 4.5e6 + 1.125, -1e9 + 1.375]]);
     }
 
