@@ -7,11 +7,11 @@ use tyndall::integrator::{MemoryNeed, method_of};
 use tyndall::scene::Scene;
 use tyndall_formats::memory::available;
 
-/// Refuses a film that would not fit in memory; `at` begins the message.
-pub(crate) fn film(document: &Document, at: &str) -> Result<(), LiveError> {
-    let size = document.film.size;
+/// Refuses a film that would not fit in memory with the samples from number `first` on; `at` begins the message.
+pub(crate) fn film(document: &Document, first: u32, at: &str) -> Result<(), LiveError> {
+    let (size, samples) = (document.film.size, document.render.samples.max(first));
     // The film, the picture with its layers, and the encoder's copy of it.
-    admit(Film::bytes(size, document.render.samples) + 2 * Film::bytes(size, 1), |needed, available| {
+    admit(Film::bytes(size, first, samples) + 2 * Film::bytes(size, 0, 1), |needed, available| {
         LiveError::Memory {
             at: at.to_owned(),
             key: "film.size".to_owned(),

@@ -95,7 +95,7 @@ impl LiveSession {
 
     /// Builds a scene from scratch, if there is memory for it.
     fn build(document: Document, assets: Assets, options: &Options, at: &str) -> Result<Built, LiveError> {
-        admission::film(&document, at)?;
+        admission::film(&document, 0, at)?;
         let built = Built::new(document, assets, &options.threads)
             .map_err(|source| LiveError::Scene { at: at.to_owned(), source })?;
         admission::method(&built.scene, at)?;
@@ -185,7 +185,7 @@ impl LiveSession {
         let (document, assets) = self.parse(value.clone(), at)?;
         let before = &self.built.document;
         if document.film.size != before.film.size || document.render.samples != before.render.samples {
-            admission::film(&document, at)?;
+            admission::film(&document, 0, at)?;
         }
         let more_memory = document.film.size != before.film.size || document.render != before.render;
         let built = self
@@ -224,10 +224,23 @@ impl LiveSession {
         self.session.image()
     }
 
-    /// Brings a viewer's picture up to date, toned as the document says.
-    pub fn look(&self, viewer: &mut Viewer) {
+    /// Brings a viewer's picture up to date, toned as the document says; see [`Viewer::look`].
+    pub fn look(&self, viewer: &mut Viewer, picture: &mut Vec<[u8; 3]>) {
         let film = &self.document().film;
-        self.session.look(viewer, Tone { curve: film.tone.curve(), stops: film.exposure });
+        self.session.look(viewer, Tone { curve: film.tone.curve(), stops: film.exposure }, picture);
+    }
+
+    /// Continues with the samples of another film of the same scene, see [`Session::go_on_with`].
+    ///
+    /// # Errors
+    /// [`LiveError::Memory`] if there is too little memory for the samples that are still to come.
+    ///
+    /// # Panics
+    /// If its size is not that of the scene.
+    pub fn go_on_with(&mut self, film: Film) -> Result<(), LiveError> {
+        admission::film(self.document(), film.first(), "scene")?;
+        self.session.go_on_with(film);
+        Ok(())
     }
 
     /// The film so far.

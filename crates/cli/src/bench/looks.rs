@@ -64,7 +64,7 @@ struct Times {
 impl Times {
     fn of(live: &mut LiveSession, edits: usize) -> Result<Self, Failure> {
         let mut times = Self::default();
-        let mut viewer = Viewer::default();
+        let (mut viewer, mut picture) = (Viewer::default(), Vec::new());
         live.refine(&Budget::coarse(Stride::Four));
         let first = Instant::now();
         for edit in 0..edits {
@@ -83,7 +83,7 @@ impl Times {
                 (Budget::coarse(Stride::Four), &mut times.fours),
             ] {
                 live.refine(&budget);
-                live.look(&mut viewer);
+                live.look(&mut viewer, &mut picture);
                 times.push(begun.elapsed().as_secs_f64() * 1e3);
             }
         }
@@ -117,7 +117,8 @@ pub fn look(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     let mut rows = Vec::new();
     for samples in effort.pick(&[1, 20, 100][..], &[1]) {
         live.refine(&Budget::samples(*samples));
-        let seconds = effort.seconds(&mut || live.look(&mut Viewer::default()));
+        let mut picture = Vec::new();
+        let seconds = effort.seconds(&mut || live.look(&mut Viewer::default(), &mut picture));
         rows.push(
             Row::new(TABLE, format!("{samples} samples"), "time", "ms", seconds * 1e3).at_most(LOOK_MS),
         );

@@ -7,6 +7,13 @@
 
 use super::{PixelSample, luminance_of};
 use crate::math::cast;
+use bytemuck::{Pod, Zeroable};
+
+/// Number of quantities that are estimated for each pixel; [`Sums`] and [`Estimate`] have them in the same order.
+pub(super) const QUANTITIES: usize = 9;
+
+/// Position of the luminance's squares, or deviations, among the quantities.
+pub(super) const LUMINANCE_SPREAD: usize = 6;
 
 /// Samples in a chunk.
 pub(super) const CHUNK: u32 = 16;
@@ -15,12 +22,13 @@ pub(super) const CHUNK: u32 = 16;
 pub(super) const FAN_OUT: u32 = 4;
 
 /// Number of samples in a child of a node of this level; the children of level 0 are chunks.
-pub(super) fn samples_below(level: usize) -> u32 {
-    CHUNK * FAN_OUT.pow(cast::fit_u32(level))
+pub(super) fn samples_below(level: usize) -> u64 {
+    u64::from(CHUNK) * u64::from(FAN_OUT).pow(cast::fit_u32(level))
 }
 
 /// Sums over the samples of an incomplete chunk.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Sums {
     radiance: [f64; 3],
     squares: [f64; 3],
@@ -42,26 +50,25 @@ impl Sums {
         self.depth += f64::from(sample.depth);
     }
 
-    /// The mean radiance of these samples, whose number is `n`: that of [`Self::estimate`].
-    #[inline]
-    pub fn mean(&self, n: u32) -> [f32; 3] {
-        self.radiance.map(|sum| cast::single(sum / f64::from(n)))
-    }
-
-    /// The estimate from these samples, whose number is `count`.
-    pub fn estimate(&self, count: u32) -> Estimate {
-        let n = f64::from(count);
+    /// The estimate from these samples, whose number is `n`.
+    pub fn estimate(&self, n: f64) -> Estimate {
         // Rounding may make this negative if all samples are equal.
         let scatter = |squares: f64, sum: f64| cast::single((squares - sum * sum / n).max(0.0));
-        let mean = |sum: f64| cast::single(sum / n);
+        let mean = |sum: f64| mean_of(sum, n);
         Estimate {
-            mean: self.mean(count),
+            mean: self.radiance.map(mean),
             scatter: std::array::from_fn(|c| scatter(self.squares[c], self.radiance[c])),
             luminance_scatter: scatter(self.luminance_squares, luminance_of(self.radiance)),
             alpha: mean(self.alpha),
             depth: mean(self.depth),
         }
     }
+}
+
+/// The mean of `n` samples with this sum.
+#[inline(always)]
+pub(super) fn mean_of(sum: f64, n: f64) -> f32 {
+    cast::single(sum / n)
 }
 
 /// The mean of all samples, where `share` is the fraction of them that the second mean represents.
@@ -71,7 +78,8 @@ pub(super) fn merged_mean(a: f32, b: f32, share: f64) -> f32 {
 }
 
 /// Means over samples, and sums of squared deviations from them.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Estimate {
     pub mean: [f32; 3],
     /// Sum of squared deviations from the mean.
@@ -85,8 +93,7 @@ pub(super) struct Estimate {
 
 impl Estimate {
     /// Merges the estimates from `n` samples here and `m` there, in double precision \[Chan83\].
-    pub fn merged(&self, n: u32, other: &Self, m: u32) -> Self {
-        let (n, m) = (f64::from(n), f64::from(m));
+    pub fn merged(&self, n: f64, other: &Self, m: f64) -> Self {
         let share = m / (n + m);
         let mean = |a: f32, b: f32| merged_mean(a, b, share);
         let scatter = |[a, b]: [f32; 2], apart: f64| {

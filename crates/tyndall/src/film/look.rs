@@ -1,9 +1,9 @@
-//! Views of an unfinished film: what changed since the last look, tone-mapped for a display.
+//! Views of an unfinished film: what changed since the last look, tone-mapped for a display, or as it is.
 
-use super::Film;
 use super::tile::{TILE, Tile};
-use super::tone::ToneCurve;
-use crate::simd::Level;
+use super::tone::{BATCH, Encode, ToneCurve};
+use super::{Film, Image};
+use crate::simd::{Kernel, Lanes, Level};
 use rayon::prelude::*;
 
 /// How radiance is shown on a display.
@@ -15,15 +15,15 @@ pub struct Tone {
     pub stops: f32,
 }
 
-/// A viewer of a film, with a picture of its own, of which each look updates the tiles that have changed.
+/// A viewer of a film, which remembers what it has seen of it. Each look updates the tiles that have changed in a picture
+/// that the caller keeps; a viewer that looks in more than one way, or into more than one picture, renews them all.
 ///
-/// The picture is opaque RGB with 8 bits per channel, row by row from the top; a transparent film is shown over black. A pixel
-/// without a sample shows the first pixel of its block; a tile without samples keeps what the viewer showed before.
+/// A pixel without a sample shows the first pixel of its block; a tile without samples keeps what the picture showed before.
 #[derive(Clone, Debug, Default)]
 pub struct Viewer {
     size: [u32; 2],
-    tone: Tone,
-    pixels: Vec<[u8; 3]>,
+    /// `None` for a linear picture.
+    tone: Option<Tone>,
     /// The revision of each tile, row by row.
     seen: Vec<Revision>,
     /// Origins of the tiles that the last look updated.
@@ -38,16 +38,10 @@ struct Revision {
 }
 
 impl Viewer {
-    /// Width and height; zero before the first look.
+    /// Width and height of the film at the last look; zero before the first.
     #[must_use]
     pub fn size(&self) -> [u32; 2] {
         self.size
-    }
-
-    /// The picture, three bytes a pixel.
-    #[must_use]
-    pub fn pixels(&self) -> &[u8] {
-        self.pixels.as_flattened()
     }
 
     /// Origins of the tiles that the last look updated; their edge is [`TILE`] pixels, or less at the picture's border.
@@ -56,58 +50,105 @@ impl Viewer {
         &self.changed
     }
 
-    /// Updates the picture, in parallel on the current pool.
-    pub fn look(&mut self, film: &Film, tone: Tone, level: Level) {
-        if self.size != film.size {
-            *self = Self { size: film.size, tone, ..Self::default() };
-            self.pixels.resize(film.size.map(|n| n as usize).iter().product(), [0; 3]);
-            self.seen.resize(film.tiles.len(), Revision::default());
+    /// Updates a picture of opaque RGB with 8 bits per channel, row by row from the top, in parallel on the current pool; a
+    /// transparent film is shown over black. A picture of the wrong size is made anew.
+    pub fn look(&mut self, film: &Film, tone: Tone, level: Level, picture: &mut Vec<[u8; 3]>) {
+        let pixels = film.pixel_count();
+        if picture.len() != pixels {
+            *picture = vec![[0; 3]; pixels];
+            self.size = [0; 2];
         }
-        if self.tone != tone {
-            self.tone = tone;
-            self.seen.fill(Revision::default());
-        }
+        self.face(film, Some(tone));
         let width = self.size[0] as usize;
         let columns = width.div_ceil(TILE as usize);
-        let bands = self.pixels.par_chunks_mut(width * TILE as usize);
+        let bands = picture.par_chunks_mut(width * TILE as usize);
         let rows = film.tiles.par_chunks(columns).zip(self.seen.par_chunks_mut(columns)).zip(bands);
         let updated = rows.flat_map_iter(|((tiles, seen), band)| {
-            let mut row = Row { width, level, tone, band };
-            let mut changed = Vec::new();
-            for (tile, seen) in tiles.iter().zip(seen) {
-                let revision = Revision { film: film.generation, taken: tile.taken() };
-                if *seen != revision && tile.taken() > 0 {
-                    *seen = revision;
-                    row.update(tile);
-                    changed.push(tile.origin());
-                }
+            let changed = changed(film.generation, tiles, seen);
+            for tile in &changed {
+                level.run(Show { tone, tile, width, band: &mut *band });
             }
-            changed
+            changed.into_iter().map(Tile::origin).collect::<Vec<_>>()
         });
         self.changed = updated.collect();
     }
+
+    /// Updates a linear picture with the variance and depth of each pixel, as [`Film::image`] returns it, except that missing pixels
+    /// are filled. A picture of the wrong size is made anew.
+    pub fn look_linear(&mut self, film: &Film, picture: &mut Image) {
+        if picture.size != film.size || picture.rgba.len() != film.pixel_count() {
+            *picture = Image::empty(film.size);
+            self.size = [0; 2];
+        }
+        self.face(film, None);
+        let changed = changed(film.generation, &film.tiles, &mut self.seen);
+        for tile in &changed {
+            picture.update(tile);
+            for (pixel, source) in tile.shown().into_iter().flatten().enumerate() {
+                let [to, from] = [pixel, source].map(|pixel| picture.index_of(tile.position(pixel)));
+                picture.rgba[to] = picture.rgba[from];
+                picture.variance[to] = picture.variance[from];
+                picture.depth[to] = picture.depth[from];
+            }
+        }
+        self.changed = changed.into_iter().map(Tile::origin).collect();
+    }
+
+    /// Forgets what it has seen if that was of another size or shown in another way.
+    fn face(&mut self, film: &Film, tone: Option<Tone>) {
+        if self.size != film.size || self.tone != tone {
+            let seen = vec![Revision::default(); film.tiles.len()];
+            *self = Self { size: film.size, tone, seen, changed: Vec::new() };
+        }
+    }
 }
 
-/// A row of tiles in the viewer's picture.
-struct Row<'a> {
-    width: usize,
-    level: Level,
+/// The tiles that have samples and are not as they were `seen`, which is updated.
+fn changed<'a>(film: u64, tiles: &'a [Tile], seen: &mut [Revision]) -> Vec<&'a Tile> {
+    let mut changed = Vec::new();
+    for (tile, seen) in tiles.iter().zip(seen) {
+        let revision = Revision { film, taken: tile.taken() };
+        if *seen != revision && tile.taken() > 0 {
+            *seen = revision;
+            changed.push(tile);
+        }
+    }
+    changed
+}
+
+/// Shows a tile in the picture.
+struct Show<'a> {
     tone: Tone,
+    tile: &'a Tile,
+    /// Of the picture.
+    width: usize,
+    /// The rows of the picture that the tile is in.
     band: &'a mut [[u8; 3]],
 }
 
-impl Row<'_> {
-    fn update(&mut self, tile: &Tile) {
-        let mut radiance = [[0.0; 3]; (TILE * TILE) as usize];
-        let mut codes = [[0; 3]; (TILE * TILE) as usize];
-        let [columns, rows] = tile.size().map(|n| n as usize);
-        let count = columns * rows;
-        tile.look(&mut radiance[..count]);
-        self.tone.curve.encode(self.level, self.tone.stops, &radiance[..count], &mut codes[..count]);
-        let left = tile.origin()[0] as usize;
-        for (row, codes) in codes[..count].chunks_exact(columns).enumerate() {
-            let first = row * self.width + left;
-            self.band[first..first + columns].copy_from_slice(codes);
+impl Kernel for Show<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, simd: S) {
+        let Self { tone: Tone { curve, stops }, tile, width, band } = self;
+        let mut planes = [[0.0; BATCH]; 3];
+        tile.radiance(&mut planes);
+        if let Some(shown) = tile.shown() {
+            for plane in &mut planes {
+                let own = *plane;
+                for (shown, &source) in plane.iter_mut().zip(&shown) {
+                    *shown = own[source];
+                }
+            }
+        }
+        let mut codes = [[0; 3]; BATCH];
+        let codes = &mut codes[..tile.pixel_count()];
+        Encode { curve, gain: stops.exp2(), planes: &planes, codes: &mut *codes }.run(simd);
+        let (left, columns) = (tile.origin()[0] as usize, tile.size()[0] as usize);
+        for (row, codes) in codes.chunks_exact(columns).enumerate() {
+            let first = row * width + left;
+            band[first..first + columns].copy_from_slice(codes);
         }
     }
 }

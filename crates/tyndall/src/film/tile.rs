@@ -1,12 +1,22 @@
 //! A tile: the unit of work, with the estimates of its pixels.
 
 use super::PixelSample;
-use super::estimate::{CHUNK, Estimate, FAN_OUT, Sums, merged_mean, samples_below};
+use super::estimate::Estimate;
+use super::noise::TileNoise;
+use super::state::StateError;
+use super::tone::{BATCH, Planes};
+use super::tree::{Piece, Place, Tree, pieces};
+use crate::math::cast;
 use std::ops::Range;
 use std::sync::Arc;
 
 /// Edge of a tile in pixels.
 pub const TILE: u32 = 16;
+
+const _: () = assert!((TILE * TILE) as usize == BATCH, "a tile is shown as one batch");
+
+/// Maximum number of samples per pixel.
+const MOST_SAMPLES: u32 = 1 << 31;
 
 /// Edge of the blocks in which a tile's pixels are ordered.
 const BLOCK: u32 = 4;
@@ -36,7 +46,7 @@ impl Stride {
 /// How many samples a film is to have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Goal {
-    /// Samples in every pixel.
+    /// Samples in every pixel; those of earlier parts of the picture count.
     pub samples: u32,
     /// One sample more in the pixels of a stride.
     pub more: Option<Stride>,
@@ -95,30 +105,33 @@ pub struct Tile {
     samples: u32,
     /// Pixels that have one sample more.
     ahead: usize,
-    /// The incomplete chunk of each pixel.
-    open: Vec<Sums>,
-    /// For each level of the tree and each pixel, the merged children of the node that is incomplete. Their number follows from
-    /// the number of samples; where it is zero, the entry is out of date.
-    nodes: Vec<Vec<Estimate>>,
-}
-
-/// Bytes per pixel once it has this many samples: 72, and 36 for each level of the tree that they reach.
-pub(super) fn bytes_of_pixel(samples: u32) -> usize {
-    let levels = (0..16).take_while(|&level| samples >= samples_below(level)).count();
-    size_of::<Sums>() + levels * size_of::<Estimate>()
+    /// The samples; its pixels are numbered row by row.
+    tree: Tree,
+    noise: TileNoise,
 }
 
 impl Tile {
-    /// A tile without samples.
-    pub(super) fn new(origin: [u32; 2], order: Arc<Order>) -> Self {
-        let open = vec![Sums::default(); order.positions.len()];
-        Self { origin, order, samples: 0, ahead: 0, open, nodes: Vec::new() }
+    /// A tile without samples, of which the first will have the number `first`.
+    pub(super) fn new(origin: [u32; 2], order: Arc<Order>, first: u32) -> Self {
+        let tree = Tree::new(order.positions.len(), first);
+        Self { origin, order, samples: first, ahead: 0, tree, noise: TileNoise::default() }
     }
 
-    /// Samples that every pixel of the tile has.
+    /// Forgets all samples, but keeps the memory.
+    pub(super) fn clear(&mut self) {
+        self.tree.clear();
+        (self.samples, self.ahead, self.noise) = (0, 0, TileNoise::default());
+    }
+
+    /// Samples that every pixel of the tile has; those of earlier parts of the picture count.
     #[must_use]
     pub fn samples(&self) -> u32 {
         self.samples
+    }
+
+    /// Number of the first sample that it has, or will have.
+    pub(super) fn first(&self) -> u32 {
+        self.tree.first()
     }
 
     /// Pixels in it.
@@ -130,18 +143,18 @@ impl Tile {
     /// Samples that its pixels have taken, all together.
     #[must_use]
     pub fn taken(&self) -> usize {
-        self.samples as usize * self.pixel_count() + self.ahead
+        (self.samples - self.first()) as usize * self.pixel_count() + self.ahead
     }
 
     /// Number of samples that its pixels have taken in total once it has reached a goal.
-    fn taken_at(&self, Goal { samples, more }: Goal) -> usize {
+    pub(super) fn taken_at(&self, Goal { samples, more }: Goal) -> usize {
         let more = more.map_or(0, |stride| self.order.within[stride as usize]);
-        samples as usize * self.pixel_count() + more
+        samples.saturating_sub(self.first()) as usize * self.pixel_count() + more
     }
 
     /// Number of pixels that have a sample.
     pub(super) fn covered(&self) -> usize {
-        if self.samples > 0 { self.pixel_count() } else { self.ahead }
+        if self.samples > self.first() { self.pixel_count() } else { self.ahead }
     }
 
     /// Whether it has reached a goal.
@@ -183,137 +196,146 @@ impl Tile {
         [self.origin[0] + x, self.origin[1] + y]
     }
 
+    /// Position in the film of a pixel that is numbered row by row.
+    pub(super) fn position(&self, pixel: usize) -> [u32; 2] {
+        let (pixel, width) = (cast::fit_u32(pixel), self.order.size[0]);
+        self.in_film([pixel % width, pixel / width])
+    }
+
+    /// The number, row by row, of a pixel in the tile.
+    fn pixel_at(&self, [x, y]: [u32; 2]) -> usize {
+        (y * self.order.size[0] + x) as usize
+    }
+
     /// Adds the sample of the pixel whose turn it is.
     pub fn add(&mut self, sample: &PixelSample) {
-        let i = self.ahead;
-        self.open[i].add(sample);
-        let samples = self.samples + 1;
-        if samples.is_multiple_of(CHUNK) {
-            self.close_chunk(i, samples / CHUNK - 1);
-        }
+        let pixel = self.pixel_at(self.order.positions[self.ahead]);
+        self.tree.add(pixel, self.samples, sample);
         self.ahead += 1;
         if self.ahead == self.pixel_count() {
-            self.samples = samples;
+            self.samples += 1;
             self.ahead = 0;
         }
     }
 
-    /// Merges a pixel's complete chunk into the tree, and each node that this completes.
-    fn close_chunk(&mut self, pixel: usize, chunk: u32) {
-        let mut node = std::mem::take(&mut self.open[pixel]).estimate(CHUNK);
-        let mut number = chunk;
-        for level in 0.. {
-            if level == self.nodes.len() {
-                self.nodes.push(vec![Estimate::default(); self.order.positions.len()]);
-            }
-            let met = &mut self.nodes[level][pixel];
-            let (child, size) = (number % FAN_OUT, samples_below(level));
-            if child > 0 {
-                node = met.merged(child * size, &node, size);
-            }
-            if child + 1 < FAN_OUT {
-                *met = node;
-                return;
-            }
-            number /= FAN_OUT;
-        }
+    /// Number of the sample that a pixel takes next.
+    pub(super) fn samples_of(&self, pixel: usize) -> u32 {
+        self.samples + u32::from(usize::from(self.order.numbers[pixel]) < self.ahead)
     }
 
-    /// Samples of the `i`-th pixel.
-    fn samples_of(&self, i: usize) -> u32 {
-        self.samples + u32::from(i < self.ahead)
+    /// Where the samples are of pixels whose turn was not yet, and of those whose turn was.
+    fn pieces(&self) -> [Vec<Piece>; 2] {
+        [self.samples, self.samples + 1].map(|end| pieces(self.first(), end))
     }
 
-    /// The estimate from all samples of the `i`-th pixel, merged from the largest node to the incomplete chunk.
-    fn estimate(&self, i: usize) -> Estimate {
-        let samples = self.samples_of(i);
-        let (mut whole, mut n) = (Estimate::default(), 0);
-        let mut add = |part: Estimate, m: u32| {
-            whole = if n > 0 { whole.merged(n, &part, m) } else { part };
-            n += m;
-        };
-        for (level, nodes) in self.nodes.iter().enumerate().rev() {
-            let met = samples / samples_below(level) % FAN_OUT;
-            if met > 0 {
-                add(nodes[i], met * samples_below(level));
-            }
-        }
-        let open = samples % CHUNK;
-        if open > 0 {
-            add(self.open[i].estimate(open), open);
-        }
-        whole
+    /// Measures the tile's noise if it has enough new samples; `whole` is the picture's mean luminance.
+    pub(crate) fn measure_noise(&mut self, whole: f64) {
+        self.noise.measure(&self.tree, self.order.positions.len(), self.samples, whole);
     }
 
-    /// The radiance of each pixel, row by row; where a pixel has no sample, that of the first pixel of its block. At least the
-    /// tile's first pixel must have a sample.
-    pub(super) fn look(&self, radiance: &mut [[f32; 3]]) {
-        let means = [self.samples, self.samples + 1].map(|samples| Means::new(samples, self.nodes.len()));
+    /// The sum of its pixels' mean luminances, when they were last measured.
+    pub(super) fn luminance(&self) -> f64 {
+        self.noise.luminance()
+    }
+
+    /// The sum of its pixels' relative variances, by the last measurement; `None` before every pixel has two samples.
+    pub(super) fn relative_variance(&self) -> Option<f64> {
+        self.noise.relative_variance(self.taken() as f64 / self.pixel_count() as f64)
+    }
+
+    /// For each pixel, row by row, that pixel or, if it has no sample, the first one of its block that has; `None` if all have a sample.
+    /// At least the tile's first pixel must have one.
+    pub(super) fn shown(&self) -> Option<Vec<usize>> {
+        if self.covered() == self.pixel_count() {
+            return None;
+        }
         let width = self.order.size[0];
-        for (i, radiance) in (0..).zip(radiance) {
+        let shown = (0..cast::fit_u32(self.pixel_count())).map(|i| {
             let [x, y] = [i % width, i / width];
-            let number = |stride: u32| {
-                let mask = !(stride - 1);
-                usize::from(self.order.numbers[((y & mask) * width + (x & mask)) as usize])
-            };
-            let has_sample = |pixel: usize| self.samples > 0 || pixel < self.ahead;
-            let pixel = [1, 2, 4, 8].into_iter().map(number).find(|&pixel| has_sample(pixel)).unwrap_or(0);
-            *radiance = means[usize::from(pixel < self.ahead)].radiance(self, pixel);
+            let first_of = |stride: u32| self.pixel_at([x & !(stride - 1), y & !(stride - 1)]);
+            let has_sample = |pixel: &usize| usize::from(self.order.numbers[*pixel]) < self.ahead;
+            [1, 2, 4, 8].into_iter().map(first_of).find(has_sample).unwrap_or(0)
+        });
+        Some(shown.collect())
+    }
+
+    /// The mean radiance of each pixel, row by row, from its own samples.
+    #[inline(always)]
+    pub(super) fn radiance(&self, planes: &mut Planes) {
+        let [before, after] = self.pieces();
+        self.tree.radiance(&before, planes);
+        if self.ahead > 0 {
+            let mut with_next = [[0.0; BATCH]; 3];
+            self.tree.radiance(&after, &mut with_next);
+            for (plane, with_next) in planes.iter_mut().zip(&with_next) {
+                for (pixel, &number) in self.order.numbers.iter().enumerate() {
+                    if usize::from(number) < self.ahead {
+                        plane[pixel] = with_next[pixel];
+                    }
+                }
+            }
         }
     }
 
-    /// Each pixel's position in the film, number of samples and estimate.
+    /// Each pixel's position in the film, number of samples and estimate, row by row.
     pub(super) fn pixels(&self) -> impl Iterator<Item = PixelEstimate> {
-        self.order.positions.iter().enumerate().map(|(i, &position)| PixelEstimate {
-            position: self.in_film(position),
-            samples: f64::from(self.samples_of(i)),
-            estimate: self.estimate(i),
+        let [before, after] = self.pieces();
+        (0..self.pixel_count()).map(move |pixel| {
+            let next = self.samples_of(pixel);
+            PixelEstimate {
+                position: self.position(pixel),
+                samples: f64::from(next - self.first()),
+                estimate: self.tree.estimate(pixel, if next > self.samples { &after } else { &before }),
+            }
         })
     }
-}
 
-/// How to merge the mean radiance of pixels with a given number of samples: gives the same bits as [`Tile::estimate`].
-struct Means {
-    /// Levels to merge, each with its share of the samples merged so far.
-    nodes: Vec<(usize, f64)>,
-    /// Samples of the incomplete chunk, and their share.
-    open: (u32, f64),
-}
-
-impl Means {
-    fn new(samples: u32, levels: usize) -> Self {
-        let mut n = 0;
-        let mut share = |m: u32| {
-            n += m;
-            f64::from(m) / f64::from(n)
+    /// Every place where samples of a pixel are stored.
+    pub(super) fn stored(&self) -> Vec<StoredAt> {
+        let [before, after] = self.pieces();
+        let of_pixel = |pixel| {
+            let pieces = if self.samples_of(pixel) > self.samples { &after } else { &before };
+            pieces.iter().map(move |piece| StoredAt { pixel, place: piece.place })
         };
-        let met = |level: usize| samples / samples_below(level) % FAN_OUT * samples_below(level);
-        let nodes = (0..levels).rev().filter(|&level| met(level) > 0).map(|level| (level, share(met(level))));
-        let nodes = nodes.collect();
-        let open = samples % CHUNK;
-        Self { nodes, open: (open, if open > 0 { share(open) } else { 0.0 }) }
+        (0..self.pixel_count()).flat_map(of_pixel).collect()
     }
 
-    #[inline]
-    fn radiance(&self, tile: &Tile, pixel: usize) -> [f32; 3] {
-        let mut mean = [0.0; 3];
-        let mut add = |part: [f32; 3], share: f64| {
-            // The first part is exact.
-            mean = if share == 1.0 {
-                part
-            } else {
-                std::array::from_fn(|c| merged_mean(mean[c], part[c], share))
-            };
-        };
-        for &(level, share) in &self.nodes {
-            add(tile.nodes[level][pixel].mean, share);
+    /// Continues after the samples that its pixels have: `next` is the number of the sample that a pixel of the film takes next.
+    pub(super) fn go_on_after(&mut self, next: impl Fn([u32; 2]) -> u32) -> Result<(), StateError> {
+        let numbers: Vec<u32> = self.positions(0..self.pixel_count()).map(next).collect();
+        let samples = numbers.last().copied().unwrap_or(0);
+        let ahead = numbers.iter().take_while(|&&number| number > samples).count();
+        for (i, (&found, position)) in numbers.iter().zip(self.positions(0..numbers.len())).enumerate() {
+            let expected = if i < ahead { samples.saturating_add(1) } else { samples };
+            if found != expected || found < self.first() || found > MOST_SAMPLES {
+                return Err(StateError::Samples { position, found, expected: expected.max(self.first()) });
+            }
         }
-        let (open, share) = self.open;
-        if open > 0 {
-            add(tile.open[pixel].mean(open), share);
-        }
-        mean
+        (self.samples, self.ahead) = (samples, ahead);
+        Ok(())
     }
+
+    pub(super) fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    pub(super) fn tree_mut(&mut self) -> &mut Tree {
+        &mut self.tree
+    }
+
+    /// Adds the samples of the same tile of a later part, which is complete, as this one is.
+    pub(super) fn append(&mut self, part: &Self) {
+        self.tree.append(&part.tree, part.samples);
+        self.samples = part.samples;
+        self.noise = TileNoise::default();
+    }
+}
+
+/// A place where samples of a pixel are stored.
+pub(super) struct StoredAt {
+    /// The pixel's number, row by row.
+    pub pixel: usize,
+    pub place: Place,
 }
 
 /// The state of a pixel.

@@ -3,7 +3,6 @@
 //! A curve is for display only; the film records linear radiance.
 
 use crate::math::{LUMINANCE, Rgb};
-use crate::simd::MOST_LANES;
 use crate::simd::{Kernel, Lanes, Level, exp2_unfused, log2_unfused};
 use fearless_simd::prelude::*;
 use std::ops::{Add, Div, Mul};
@@ -33,9 +32,11 @@ impl ToneCurve {
     /// Negative and undefined channels show as black, infinite ones as the brightest value.
     #[must_use]
     pub fn map(self, linear: Rgb, exposure_stops: f32) -> Rgb {
-        let pixels = &[linear.to_array()];
+        let mut planes = [[0.0; BATCH]; 3];
+        [planes[0][0], planes[1][0], planes[2][0]] = linear.to_array();
         let mut codes = [[0.0; 3]];
-        Level::best().run(Encode { curve: self, gain: exposure_stops.exp2(), pixels, codes: &mut codes });
+        let gain = exposure_stops.exp2();
+        Level::best().run(Encode { curve: self, gain, planes: &planes, codes: &mut codes });
         Rgb::from(codes[0])
     }
 
@@ -45,12 +46,19 @@ impl ToneCurve {
     /// If there are not as many `codes` as `pixels`.
     pub fn encode(self, level: Level, exposure_stops: f32, pixels: &[[f32; 3]], codes: &mut [[u8; 3]]) {
         assert_eq!(pixels.len(), codes.len(), "pixels and their codes");
-        level.run(Encode { curve: self, gain: exposure_stops.exp2(), pixels, codes });
+        let gain = exposure_stops.exp2();
+        let mut planes = [[0.0; BATCH]; 3];
+        for (pixels, codes) in pixels.chunks(BATCH).zip(codes.chunks_mut(BATCH)) {
+            for (i, pixel) in pixels.iter().enumerate() {
+                [planes[0][i], planes[1][i], planes[2][i]] = *pixel;
+            }
+            level.run(Encode { curve: self, gain, planes: &planes, codes });
+        }
     }
 }
 
 /// The type of a code value.
-trait Code: Copy {
+pub(super) trait Code: Copy {
     /// From a value in [0, 1], and the same as one of 256 levels.
     fn new(value: f32, level: i32) -> Self;
 }
@@ -69,12 +77,20 @@ impl Code for u8 {
     }
 }
 
-/// Encodes pixels, a vector of them at a time.
-struct Encode<'a, C> {
-    curve: ToneCurve,
-    gain: f32,
-    pixels: &'a [[f32; 3]],
-    codes: &'a mut [[C; 3]],
+/// Number of pixels that are encoded at once.
+pub(super) const BATCH: usize = 256;
+
+/// Radiance of a batch of pixels, channel by channel.
+pub(super) type Planes = [[f32; BATCH]; 3];
+
+/// Encodes the first pixels of a batch, a vector of them at a time.
+pub(super) struct Encode<'a, C> {
+    pub curve: ToneCurve,
+    /// Multiplies the radiance.
+    pub gain: f32,
+    pub planes: &'a Planes,
+    /// Of at most [`BATCH`] pixels.
+    pub codes: &'a mut [[C; 3]],
 }
 
 impl<C: Code> Kernel for Encode<'_, C> {
@@ -82,16 +98,12 @@ impl<C: Code> Kernel for Encode<'_, C> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { curve, gain, pixels, codes } = self;
-        for (pixels, codes) in pixels.chunks(S::WIDTH).zip(codes.chunks_mut(S::WIDTH)) {
-            // Lanes beyond the last pixel are black.
-            let mut linear = [[0.0; MOST_LANES]; 3];
-            for (lane, [r, g, b]) in pixels.iter().enumerate() {
-                (linear[0][lane], linear[1][lane], linear[2][lane]) = (*r * gain, *g * gain, *b * gain);
-            }
-            let r = clip(simd, S::f32s::from_slice(simd, &linear[0][..S::WIDTH]), BRIGHTEST);
-            let g = clip(simd, S::f32s::from_slice(simd, &linear[1][..S::WIDTH]), BRIGHTEST);
-            let b = clip(simd, S::f32s::from_slice(simd, &linear[2][..S::WIDTH]), BRIGHTEST);
+        let Self { curve, gain, planes: [red, green, blue], codes } = self;
+        for (batch, codes) in codes.chunks_mut(S::WIDTH).enumerate() {
+            let lanes = batch * S::WIDTH..(batch + 1) * S::WIDTH;
+            let r = clip(simd, S::f32s::from_slice(simd, &red[lanes.clone()]) * gain, BRIGHTEST);
+            let g = clip(simd, S::f32s::from_slice(simd, &green[lanes.clone()]) * gain, BRIGHTEST);
+            let b = clip(simd, S::f32s::from_slice(simd, &blue[lanes]) * gain, BRIGHTEST);
             let shown = match curve {
                 ToneCurve::Agx => agx(simd, [r, g, b]),
                 ToneCurve::Linear => encode_all(simd, [r, g, b]),

@@ -5,7 +5,7 @@ use super::method::{
     Chosen, Edited, KeptItems, MemoryNeed, Method, MethodReport, MovedKey, PixelCounts, Resources,
     SettingProblem,
 };
-use crate::film::{Film, Goal, Tile};
+use crate::film::{Film, Goal};
 use crate::scene::{Difference, MethodChoice, Scene};
 use rayon::prelude::*;
 use schemars::{Schema, SchemaGenerator};
@@ -24,7 +24,7 @@ pub(crate) trait Engine: Send + Sync {
     /// See [`Method::samples_at_once`].
     fn samples_at_once(&self) -> u32;
     /// See [`Method::refine`]; refines all tiles, in parallel on the current pool.
-    fn refine(&mut self, scene: &Scene, tiles: &mut [Tile], goal: Goal, limits: &Limits);
+    fn refine(&mut self, scene: &Scene, film: &mut Film, goal: Goal, limits: &Limits);
     /// See [`Method::report`].
     fn report(&self, pixels: &PixelCounts) -> MethodReport;
     /// See [`Method::kept_items`].
@@ -61,12 +61,13 @@ impl<M: Method> Engine for Driver<M> {
         self.method.samples_at_once()
     }
 
-    fn refine(&mut self, scene: &Scene, tiles: &mut [Tile], goal: Goal, limits: &Limits) {
-        let method = &self.method;
-        tiles.par_iter_mut().zip(&mut self.tiles).with_max_len(1).for_each(|(tile, state)| {
+    fn refine(&mut self, scene: &Scene, film: &mut Film, goal: Goal, limits: &Limits) {
+        let (method, whole) = (&self.method, film.measured_luminance());
+        film.tiles_mut().par_iter_mut().zip(&mut self.tiles).with_max_len(1).for_each(|(tile, state)| {
             let stop = limits.stop();
             if !tile.has_reached(goal) && !stop.reached() {
                 method.refine(scene, tile, state, goal, &stop);
+                tile.measure_noise(whole);
             }
         });
     }

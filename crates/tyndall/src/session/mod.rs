@@ -45,12 +45,16 @@ impl Budget {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Progress {
-    /// Minimum number of samples per pixel.
+    /// Minimum number of samples per pixel; in a part of a picture, those of the parts before it count.
     pub samples: u32,
-    /// Samples per pixel on average.
+    /// Samples that were taken of all pixels together.
+    pub pixel_samples: u64,
+    /// Samples that were taken per pixel, on average.
     pub mean_samples: f64,
     /// Fraction of the pixels that have a sample.
     pub coverage: f64,
+    /// Noise of the picture, see [`Film::measured_error`]; `None` for a method without noise.
+    pub relative_error: Option<f64>,
 }
 
 /// Seconds that a stage of the work took.
@@ -184,9 +188,19 @@ impl Session {
         self.film.image()
     }
 
-    /// Brings a viewer's picture up to date, on the session's threads.
-    pub fn look(&self, viewer: &mut Viewer, tone: Tone) {
-        self.threads.install(|| viewer.look(&self.film, tone, self.resources.level));
+    /// Brings a viewer's picture up to date, on the session's threads; see [`Viewer::look`].
+    pub fn look(&self, viewer: &mut Viewer, tone: Tone, picture: &mut Vec<[u8; 3]>) {
+        self.threads.install(|| viewer.look(&self.film, tone, self.resources.level, picture));
+    }
+
+    /// Continues with the samples of another film of the same scene and size: that of an earlier session, or an empty part.
+    ///
+    /// # Panics
+    /// If the size differs.
+    pub fn go_on_with(&mut self, film: Film) {
+        assert_eq!(film.size(), self.scene.size, "a film of the scene's size");
+        self.film = film;
+        self.left = self.film.mean_samples();
     }
 
     /// Renders until the budget is spent, pass by pass over all tiles, and the first pass from coarse pixels to fine ones, so that
@@ -206,10 +220,11 @@ impl Session {
             // Later, several passes at once do not delay the picture noticeably, and threads wait less for each other.
             let passes = (so_far / 4).clamp(1, 16).min(engine.samples_at_once());
             let pass = Goal::samples(so_far.saturating_add(passes));
-            let next = if so_far == 0 { film.coarse_goal().unwrap_or(pass) } else { pass };
+            let is_first = so_far == film.first();
+            let next = if is_first { film.coarse_goal().unwrap_or(pass) } else { pass };
             let goal = if next.is_beyond(budget.goal()) { budget.goal() } else { next };
             let begun = Instant::now();
-            threads.install(|| engine.refine(scene, film.tiles_mut(), goal, &limits));
+            threads.install(|| engine.refine(scene, film, goal, &limits));
             spent.sampling += begun.elapsed();
         }
         self.progress()
@@ -220,8 +235,10 @@ impl Session {
     pub fn progress(&self) -> Progress {
         Progress {
             samples: self.film.samples(),
+            pixel_samples: self.film.pixel_samples(),
             mean_samples: self.film.mean_samples(),
             coverage: self.film.coverage(),
+            relative_error: self.film.measured_error().filter(|_| self.engine.has_noise()),
         }
     }
 
