@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::parts::Share;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args as Group, Parser, Subcommand, ValueEnum, value_parser};
 use std::path::PathBuf;
@@ -43,6 +44,8 @@ pub enum Command {
     /// Play a list of edits against a live session: how fast each is, and how much was computed again
     #[command(allow_negative_numbers = true)]
     Replay(Box<ReplayOptions>),
+    /// Merge the parts of a render, in any order, to the bits of the whole
+    Merge(MergeOptions),
     /// Show what the loader understood of a volume or of a scene's volume
     Info(InfoOptions),
     /// Measure this machine: speed as ratios, latency, growth
@@ -87,6 +90,22 @@ pub struct RenderOptions {
     #[arg(long, value_name = "E", help_heading = "When to stop (whichever comes first)", value_parser = positive)]
     pub target_error: Option<f64>,
 
+    /// Render the K-th of N shares of the samples, to an OpenEXR file for `tyndall merge`
+    ///
+    /// Shares are multiples of 16 samples. Merged, they give the bits of a single run.
+    #[arg(long, value_name = "K/N", help_heading = "In several runs", value_parser = share,
+          conflicts_with_all = ["time", "target_error", "resume"])]
+    pub part: Option<Share>,
+
+    /// Keep the samples in the OpenEXR file, so that --resume can go on from it
+    #[arg(long, help_heading = "In several runs")]
+    pub resumable: bool,
+
+    /// Go on from the samples in FILE, of the same scene, to the bits of a single run; implies --resumable if an OpenEXR file is
+    /// written
+    #[arg(long, value_name = "FILE", help_heading = "In several runs")]
+    pub resume: Option<PathBuf>,
+
     /// What is rendered.
     #[command(flatten)]
     pub scene: SceneOptions,
@@ -102,6 +121,22 @@ pub struct RenderOptions {
     /// Print what is done and how long it takes
     #[arg(short, long, conflicts_with = "quiet")]
     pub verbose: bool,
+}
+
+/// Options of `merge`.
+#[derive(Debug, Group)]
+pub struct MergeOptions {
+    /// The OpenEXR files of all parts, in any order
+    #[arg(required = true, value_name = "PART")]
+    pub parts: Vec<PathBuf>,
+
+    /// Write the picture to FILE, as `render` does; repeatable
+    #[arg(short, long = "output", value_name = "FILE", required = true)]
+    pub outputs: Vec<PathBuf>,
+
+    /// Keep the samples in the OpenEXR file, so that `render --resume` can go on from it
+    #[arg(long)]
+    pub resumable: bool,
 }
 
 /// Options of `replay`.
@@ -243,6 +278,15 @@ fn size(text: &str) -> Result<[u32; 2], String> {
         .ok_or_else(|| "expected WxH with whole numbers of at least 1, e.g. 512x512".into())
 }
 
+fn share(text: &str) -> Result<Share, String> {
+    let numbers =
+        text.split_once('/').and_then(|(number, of)| Some([number.parse().ok()?, of.parse().ok()?]));
+    numbers
+        .map(|[number, of]| Share { number, of })
+        .filter(|share| (1..=share.of).contains(&share.number))
+        .ok_or_else(|| "expected K/N with whole numbers, K from 1 to N, e.g. 2/4".into())
+}
+
 fn positive(text: &str) -> Result<f64, String> {
     text.parse()
         .ok()
@@ -267,6 +311,10 @@ mod tests {
         assert_eq!(size("640x480"), Ok([640, 480]));
         for bad in ["640", "0x4", "x", "4x-1", "axb"] {
             assert!(size(bad).is_err(), "{bad}");
+        }
+        assert_eq!(share("2/4"), Ok(Share { number: 2, of: 4 }));
+        for bad in ["0/4", "5/4", "1", "1/", "/", "1/0", "-1/2", "1/2/3", "a/b"] {
+            assert!(share(bad).is_err(), "{bad}");
         }
         assert!(positive("nan").is_err() && positive("0").is_err() && positive("0.5") == Ok(0.5));
     }

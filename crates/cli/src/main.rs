@@ -5,11 +5,12 @@ mod bench;
 mod edits;
 mod failure;
 mod info;
-
 mod lists;
 mod machine;
+mod merge;
 mod output;
 mod overrides;
+mod parts;
 mod progress;
 mod render;
 mod replay;
@@ -29,6 +30,7 @@ fn main() -> ExitCode {
     let done = match args.command {
         Command::Render(options) => render::run(&options, started),
         Command::Replay(options) => replay::run(&options),
+        Command::Merge(options) => merge::run(&options),
         Command::Info(options) => info::run(&options),
         Command::Bench(options) => bench::run(&options),
         Command::Presets => lists::presets(),

@@ -1,5 +1,6 @@
 //! Writes pictures and statistics to their destinations.
 
+use crate::parts::StateInfo;
 use crate::{Failure, say, stdout_failure};
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -44,28 +45,48 @@ pub fn check(pictures: &[PathBuf], statistics: Option<&Path>) -> Result<(), Fail
     }
 }
 
-/// Writes the film to every path.
+/// Whether a path names a file that can hold samples.
+fn is_exr(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"))
+}
+
+/// Refuses paths without an OpenEXR file, which alone can hold the samples that an option is to keep.
+pub fn check_exr(paths: &[PathBuf], option: &str) -> Result<(), Failure> {
+    if paths.iter().any(|path| is_exr(path)) {
+        return Ok(());
+    }
+    Err(Failure::usage(format!("{option} needs an OpenEXR file, which holds the samples; add -o FILE.exr")))
+}
+
+/// Writes the film to every path; into OpenEXR files with its samples if they are described.
 pub fn pictures(
     paths: &[PathBuf],
     film: &Film,
     document: &Document,
     source_folder: &Path,
+    samples: Option<&StateInfo>,
 ) -> Result<(), Failure> {
     let Image { size, rgba, variance, depth } = film.image();
-    let picture = Picture {
+    let mut picture = Picture {
         width: size[0],
         height: size[1],
         rgba,
         variance: Some(variance),
         depth: Some(depth),
         transparent: document.film.background == Background::Transparent,
+        state: Vec::new(),
     };
     let tone = document.film.tone.curve();
     let display = Display { tone, exposure: document.film.exposure };
     for path in paths {
         let to_stdout = path.as_os_str() == STDOUT;
         let folder = if to_stdout { Path::new("") } else { path.parent().unwrap_or(Path::new("")) };
-        let metadata = metadata(film, document, source_folder, folder);
+        let mut metadata = metadata(film, document, source_folder, folder, samples);
+        let samples = samples.filter(|_| is_exr(path));
+        picture.state = samples.map(|_| film.state().layers).unwrap_or_default();
+        if let Some(samples) = samples {
+            samples.describe(&mut metadata);
+        }
         if to_stdout {
             let bytes = encode_png(&picture, &display, &metadata).map_err(Failure::input)?;
             let mut out = std::io::stdout().lock();
@@ -78,9 +99,18 @@ pub fn pictures(
 }
 
 /// The scene with its paths relative to the picture's folder, so that both can move together.
-fn metadata(film: &Film, document: &Document, from: &Path, to: &Path) -> Metadata {
+fn metadata(
+    film: &Film,
+    document: &Document,
+    from: &Path,
+    to: &Path,
+    samples: Option<&StateInfo>,
+) -> Metadata {
     let mut document = document.clone();
-    document.render.samples = film.samples().max(1);
+    // The scene of a part is that of the whole.
+    if samples.is_none_or(|samples| samples.part.is_none()) {
+        document.render.samples = film.samples().max(1);
+    }
     let moved = |path: &mut String| *path = relocate(path, from, to);
     document.volume.path.iter_mut().for_each(moved);
     for light in document.lights.iter_mut().flatten() {
@@ -92,7 +122,7 @@ fn metadata(film: &Film, document: &Document, from: &Path, to: &Path) -> Metadat
     metadata.insert(Metadata::SCENE, document.to_value().to_string());
     metadata.insert(Metadata::VERSION, env!("CARGO_PKG_VERSION"));
     metadata.insert(Metadata::SEED, document.render.seed.to_string());
-    metadata.insert(Metadata::SAMPLES, film.samples().to_string());
+    metadata.insert(Metadata::SAMPLES, (film.samples() - film.first()).to_string());
     metadata
 }
 

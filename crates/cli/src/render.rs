@@ -2,15 +2,18 @@
 
 use crate::args::RenderOptions;
 use crate::machine::{Interrupt, pool, vector_instructions};
+use crate::parts::{Share, StateInfo, Stored};
 use crate::progress::Display;
 use crate::stats::{Stages, peak_memory};
 use crate::{Failure, output, overrides};
 use serde_json::json;
 use std::io::Write;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use tyndall::message::sentence;
+use tyndall::film::Film;
+use tyndall::message::{path_name, sentence};
 use tyndall_live::{Budget, Input, LiveSession, Options};
 
 /// How often progress is checked.
@@ -43,6 +46,12 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let mut input = Input::open(&options.input).map_err(Failure::input)?;
     let paths = output::paths(&options.outputs, &options.input);
     output::check(&paths, options.run.stats.as_deref())?;
+    if options.part.is_some() {
+        output::check_exr(&paths, "--part")?;
+    }
+    if options.resumable {
+        output::check_exr(&paths, "--resumable")?;
+    }
 
     overrides::lay_over(&mut input, &options.scene, options.samples)?;
     let on = Options { threads: threads.clone(), level, edits: false };
@@ -61,14 +70,28 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         level.name()
     ));
 
-    let samples = live.document().render.samples;
+    let usual_samples = live.document().render.samples;
+    let mut samples = usual_samples;
+    if let Some(part) = options.part {
+        let range = part.of_samples(samples).ok_or_else(|| too_many_parts(part, samples))?;
+        live.go_on_with(Film::part(live.scene().size, range.first)).map_err(Failure::input)?;
+        samples = range.end;
+    }
+    let keeps_samples = options.part.is_some() || options.resumable || options.resume.is_some();
+    let info = keeps_samples.then(|| StateInfo::new(&live, level, options.part));
     let limited = options.time.is_some() || options.target_error.is_some();
+    if limited && options.samples.is_none() {
+        samples = u32::MAX;
+    }
+    if let (Some(path), Some(info)) = (&options.resume, &info) {
+        resume(&mut live, path, info, samples)?;
+    }
     let stop = StopConditions {
-        samples: if limited && options.samples.is_none() { u32::MAX } else { samples },
+        samples,
         time: options.time,
         error: options.target_error,
         // An error estimate needs two samples.
-        usual_samples: samples.max(2),
+        usual_samples: usual_samples.max(2),
     };
     interrupt.picture_begins();
     let display = Display::new(options.progress, options.run.quiet);
@@ -92,7 +115,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     }
     note(&format!("{:.2} samples per pixel in {rendered:.2} s", live.film().mean_samples()));
 
-    output::pictures(&paths, live.film(), live.document(), live.folder())?;
+    output::pictures(&paths, live.film(), live.document(), live.folder(), info.as_ref())?;
     stages.end("write");
     if let Some(path) = &options.run.stats {
         let film = live.film();
@@ -115,9 +138,39 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     if interrupted { Err(Failure::Interrupted) } else { Ok(()) }
 }
 
+/// More parts than chunks of samples.
+fn too_many_parts(part: Share, samples: u32) -> Failure {
+    let most = samples.div_ceil(Film::CHUNK);
+    Failure::usage(format!(
+        "--part {part}: {samples} samples are {most} times {}, the least that a part can have; expected at most {most} parts",
+        Film::CHUNK
+    ))
+}
+
+/// Continues with the samples in a file, to a number of `samples`.
+fn resume(live: &mut LiveSession, path: &Path, info: &StateInfo, samples: u32) -> Result<(), Failure> {
+    let stored = Stored::open(path)?;
+    let name = path_name(path);
+    if let Some(part) = stored.info.part {
+        return Err(Failure::input(format!(
+            "{name}: part {part} of a render; expected a whole one; merge the parts first"
+        )));
+    }
+    stored.check_session(info, live.document())?;
+    let film = stored.film()?;
+    if film.samples() > samples {
+        let found = film.samples();
+        return Err(Failure::usage(format!(
+            "{name}: has {found} samples already, more than the {samples} asked for; ask for more with --samples"
+        )));
+    }
+    live.go_on_with(film).map_err(Failure::input)
+}
+
 /// Refines in slices of time until a stop condition is met, showing progress.
 fn refine(live: &mut LiveSession, stop: &StopConditions, cancel: &Arc<AtomicBool>, mut display: Display) {
     let begun = Instant::now();
+    let (first, at_first) = (live.film().first(), live.film().mean_samples());
     // A deadline that the clock cannot represent is no limit.
     let end = stop.time.and_then(|time| begun.checked_add(time));
     let mut last_estimate = begun;
@@ -125,7 +178,7 @@ fn refine(live: &mut LiveSession, stop: &StopConditions, cancel: &Arc<AtomicBool
     loop {
         let slice = Instant::now() + SLICE;
         // The first sample of every pixel is always taken: no picture has holes.
-        let complete = live.film().samples() > 0;
+        let complete = live.film().samples() > first;
         let deadline = if complete { end.map_or(slice, |end| end.min(slice)) } else { slice };
         // By the usual samples it is known whether the picture has an error estimate at all.
         let untold = stop.error.is_some() && error.is_none();
@@ -141,7 +194,7 @@ fn refine(live: &mut LiveSession, stop: &StopConditions, cancel: &Arc<AtomicBool
             last_estimate = Instant::now();
             error = live.session().relative_error();
         }
-        let time_is_up = film.samples() > 0 && end.is_some_and(|end| Instant::now() >= end);
+        let time_is_up = film.samples() > first && end.is_some_and(|end| Instant::now() >= end);
         let good_enough = stop.error.is_some_and(|target| match error {
             Some(error) => error <= target,
             None => film.samples() >= stop.usual_samples,
@@ -150,7 +203,7 @@ fn refine(live: &mut LiveSession, stop: &StopConditions, cancel: &Arc<AtomicBool
             break;
         }
         let shares = [
-            Some(film.mean_samples() / f64::from(stop.samples)),
+            Some((film.mean_samples() - at_first) / (f64::from(stop.samples - first) - at_first)),
             stop.time.map(|time| seconds / time.as_secs_f64()),
             // Noise falls with the square root of the work.
             stop.error.zip(error).map(|(target, error)| (target / error).powi(2)),

@@ -83,7 +83,7 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
     if !options.outputs.is_empty() && live.film().samples() > 0 {
         let samples = live.document().render.samples;
         run.refine(&mut live, samples);
-        output::pictures(&options.outputs, live.film(), live.document(), live.folder())?;
+        output::pictures(&options.outputs, live.film(), live.document(), live.folder(), None)?;
     }
     played?;
     if interrupt.is_requested() { Err(Failure::Interrupted) } else { Ok(()) }

@@ -10,7 +10,7 @@ mod valid;
 use bolero::{TypeGenerator, check};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use tyndall_formats::image::{read_map, read_metadata};
+use tyndall_formats::image::{PictureState, read_map, read_metadata, read_state};
 use tyndall_formats::volume::{Endian, Loaded, RawLayout, ReadError, SampleType, read, read_raw};
 use tyndall_testing::damage::Edit;
 use tyndall_testing::within_limits;
@@ -153,6 +153,13 @@ fn damaged_pictures() {
     for_damaged(&valid::pictures(), valid::PICTURE_WORDS, |path| {
         if let Err(error) = read_metadata(path) {
             helpful(&error, path);
+        }
+        match read_state(path) {
+            Ok(PictureState { size: [width, height], layers }) => {
+                let pixels = width as usize * height as usize;
+                assert!(layers.iter().all(|layer| layer.values.len() == pixels), "{layers:?}");
+            }
+            Err(error) => helpful(&error, path),
         }
     });
 }

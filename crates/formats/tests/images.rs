@@ -6,8 +6,11 @@ use std::path::Path;
 
 use common::{folder, for_damaged_copies, rewrite};
 use tyndall::film::tone::{ToneCurve, quantize};
+use tyndall::film::{StateLayer, StateValues};
 use tyndall::math::Rgb;
-use tyndall_formats::image::{Display, ImageError, Metadata, Picture, encode_png, read_metadata, write};
+use tyndall_formats::image::{
+    Display, ImageError, Metadata, Picture, PictureState, encode_png, read_metadata, read_state, write,
+};
 
 mod common;
 
@@ -24,6 +27,7 @@ fn picture(transparent: bool) -> Picture {
         variance: Some(pixels().map(|i| [1e-9 * i, i / 3.0, f32::MIN_POSITIVE]).collect()),
         depth: Some(pixels().map(|i| if i == 5.0 { f32::INFINITY } else { 100.0 - i / 7.0 }).collect()),
         transparent,
+        ..Picture::default()
     }
 }
 
@@ -297,4 +301,36 @@ fn a_file_that_is_not_a_picture_is_reported() {
     assert!(matches!(read_metadata(&folder.join("a.png")), Err(ImageError::NotAPicture { .. })));
     assert!(matches!(read_metadata(&folder), Err(ImageError::Unreadable { .. })));
     assert!(matches!(read_metadata(&folder.join("b.png")), Err(ImageError::Unreadable { .. })));
+}
+
+#[test]
+fn samples_come_back_to_the_bit_from_openexr() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let odd =
+        [0.0, -0.0, f32::MIN_POSITIVE, 1e-45, f32::INFINITY, f32::NAN, f32::MAX, 0.1, 0.2, 0.3, 0.4, 0.5];
+    let bits = (0..12_u32).map(|i| i.wrapping_mul(0x9e37_79b9) | 0x7f80_0001).collect();
+    let state = vec![
+        StateLayer { name: "samples".to_owned(), values: StateValues::Whole(bits) },
+        StateLayer { name: "node.0.R".to_owned(), values: StateValues::Float(odd.to_vec()) },
+    ];
+    let with_state = Picture { state: state.clone(), ..picture(false) };
+    write(&path, &with_state, &DISPLAY, &small()).unwrap();
+    let PictureState { size, mut layers } = read_state(&path).unwrap();
+    layers.sort_by_key(|layer| layer.name != "samples");
+    assert_eq!(size, [4, 3]);
+    let bytes = |layer: &StateLayer| match &layer.values {
+        StateValues::Float(values) => values.iter().map(|x| x.to_bits()).collect::<Vec<_>>(),
+        StateValues::Whole(values) => values.clone(),
+    };
+    assert_eq!(layers.len(), 2);
+    for (read, written) in layers.iter().zip(&state) {
+        assert_eq!((&read.name, bytes(read)), (&written.name, bytes(written)));
+    }
+    // A picture without them has none; the other kinds leave them out.
+    write(&path, &picture(false), &DISPLAY, &small()).unwrap();
+    assert_eq!(read_state(&path).unwrap(), PictureState { size: [4, 3], layers: Vec::new() });
+    let png = folder.path().join("a.png");
+    write(&png, &with_state, &DISPLAY, &small()).unwrap();
+    assert!(matches!(read_state(&png), Err(ImageError::Malformed { .. })));
 }

@@ -5,6 +5,7 @@ use crate::assets::{self, Assets, Source};
 use crate::build::Built;
 use crate::document::{self, Document};
 use crate::error::LiveError;
+use crate::identity::SceneIdentity;
 use crate::input::{Input, LoadedScene};
 use crate::options::Options;
 use crate::undo::UndoList;
@@ -241,6 +242,13 @@ impl LiveSession {
         admission::film(self.document(), film.first(), "scene")?;
         self.session.go_on_with(film);
         Ok(())
+    }
+
+    /// What the samples depend on; hashes all voxels.
+    #[must_use]
+    pub fn identity(&self) -> SceneIdentity {
+        let Built { document, assets, .. } = &self.built;
+        self.options.threads.install(|| SceneIdentity::new(document, assets))
     }
 
     /// The film so far.

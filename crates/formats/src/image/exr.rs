@@ -1,7 +1,8 @@
 //! OpenEXR: linear radiance in 32-bit float, compressed without loss.
 //!
 //! One part whose channels are named by layer, as other programs expect: `R G B A` premultiplied,
-//! `variance.R variance.G variance.B` of the pixel's mean, `depth.Z`. Metadata are string attributes in UTF-8.
+//! `variance.R variance.G variance.B` of the pixel's mean, `depth.Z`, and the layers of the samples' state. Metadata are string
+//! attributes in UTF-8.
 
 use std::io::{BufRead, Cursor, Seek};
 
@@ -13,11 +14,12 @@ use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, ChannelList, Compression, LineOrder, Text};
 use exr::meta::header::Header;
 use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel};
+use tyndall::film::{StateLayer, StateValues};
 use tyndall::math::Rgb;
 
 use super::error::EncodeFailure;
 use super::texels::{Map, MapFailure};
-use super::{Metadata, Picture};
+use super::{Metadata, Picture, PictureState};
 
 const ENCODING: Encoding = Encoding {
     compression: Compression::ZIP16,
@@ -37,6 +39,14 @@ pub(super) fn encode(picture: &Picture, metadata: &Metadata) -> Result<Vec<u8>, 
     }
     if let Some(depth) = &picture.depth {
         channels.push(channel("depth.Z", depth.iter().copied()));
+    }
+    for StateLayer { name, values } in &picture.state {
+        let samples = match values {
+            StateValues::Float(values) => FlatSamples::F32(values.clone()),
+            StateValues::Whole(values) => FlatSamples::U32(values.clone()),
+        };
+        let name = format!("{STATE}{name}");
+        channels.push(AnyChannel { quantize_linearly: false, ..AnyChannel::new(name.as_str(), samples) });
     }
     let size = Vec2(picture.width as usize, picture.height as usize);
     let mut image = Image::from_encoded_channels(size, ENCODING, AnyChannels::sort(channels.into()));
@@ -89,6 +99,48 @@ pub(super) fn read_metadata(file: impl BufRead) -> Result<Metadata, String> {
         metadata.accept(&key, String::from_utf8_lossy(text.as_slice()).into_owned());
     }
     Ok(metadata)
+}
+
+/// Begins the names of the channels with the samples' state.
+const STATE: &str = "state.";
+
+/// The size and the layers of the samples' state.
+pub(super) fn read_state(mut file: impl BufRead + Seek, length: u64) -> Result<PictureState, MapFailure> {
+    let malformed = |error: exr::error::Error| MapFailure::Malformed(error.to_string());
+    let headers = MetaData::read_from_buffered(&mut file, false).map_err(malformed)?.headers;
+    let [header] = headers.as_slice() else {
+        let found = format!("found {} images in one file, expected one", headers.len());
+        return Err(MapFailure::Malformed(found));
+    };
+    check_size(header, length)?;
+    let (width, height) = (header.layer_size.width() as u64, header.layer_size.height() as u64);
+    // The library's copy of the pixels, and ours.
+    let needed = 2 * (width * height).saturating_mul(header.channels.bytes_per_pixel as u64);
+    if crate::memory::available().is_some_and(|available| needed > available) {
+        return Err(MapFailure::TooLarge { width, height });
+    }
+    file.rewind().map_err(|error| MapFailure::Malformed(error.to_string()))?;
+    let image = exr::image::read::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(file)
+        .map_err(malformed)?;
+    let of_channel = |channel: AnyChannel<FlatSamples>| {
+        let name = channel.name.to_string();
+        let values = match channel.sample_data {
+            FlatSamples::F32(values) => StateValues::Float(values),
+            FlatSamples::U32(values) => StateValues::Whole(values),
+            FlatSamples::F16(_) => return None,
+        };
+        name.strip_prefix(STATE).map(|name| StateLayer { name: name.to_owned(), values })
+    };
+    let layers = image.layer_data.channel_data.list.into_iter().filter_map(of_channel).collect();
+    // Both are within the limits of a map.
+    let size = [width, height].map(|side| u32::try_from(side).unwrap_or(u32::MAX));
+    Ok(PictureState { size, layers })
 }
 
 /// The largest compression ratio of the format's codecs. Deflate, the best, reaches 1032; the lossy DCT of DWA

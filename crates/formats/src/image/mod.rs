@@ -22,6 +22,7 @@ use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 use crate::atomic;
+use tyndall::film::StateLayer;
 use tyndall::film::tone::ToneCurve;
 
 mod display;
@@ -39,6 +40,7 @@ pub use error::ImageError;
 pub use map::read_map;
 pub use metadata::Metadata;
 pub use texels::Map;
+use texels::MapFailure;
 
 /// Extensions of the kinds that are written, for messages.
 const EXTENSIONS: &str = ".png, .jpg, .jpeg, .tif, .tiff or .exr";
@@ -56,6 +58,8 @@ pub struct Picture {
     pub variance: Option<Vec<[f32; 3]>>,
     /// Distance from the camera to the first matter, in world units.
     pub depth: Option<Vec<f32>>,
+    /// The samples themselves, from which a later run can go on; only OpenEXR can hold them.
+    pub state: Vec<StateLayer>,
     /// Whether the background shows through where the opacity is below 1.
     pub transparent: bool,
 }
@@ -67,6 +71,9 @@ impl Picture {
         assert_eq!(self.rgba.len(), pixels, "pixels of the picture");
         assert_eq!(self.variance.as_ref().map_or(pixels, Vec::len), pixels, "pixels of the variance");
         assert_eq!(self.depth.as_ref().map_or(pixels, Vec::len), pixels, "pixels of the depth");
+        for layer in &self.state {
+            assert_eq!(layer.values.len(), pixels, "pixels of the state layer `{}`", layer.name);
+        }
     }
 }
 
@@ -151,6 +158,34 @@ pub fn read_metadata(path: &Path) -> Result<Option<Metadata>, ImageError> {
     };
     let metadata = read.map_err(|reason| ImageError::malformed(path, name, reason))?;
     Ok(Some(metadata).filter(|metadata| !metadata.is_empty()))
+}
+
+/// The samples in a picture of the kind OpenEXR.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PictureState {
+    /// Width and height.
+    pub size: [u32; 2],
+    /// [`Picture::state`].
+    pub layers: Vec<StateLayer>,
+}
+
+/// Reads [`Picture::state`] of an OpenEXR file; there are no layers if it was written without.
+///
+/// # Errors
+/// [`ImageError::Unreadable`] if the file cannot be read, [`ImageError::Malformed`] for a damaged one or another kind,
+/// [`ImageError::TooLarge`] if it does not fit the memory.
+pub fn read_state(path: &Path) -> Result<PictureState, ImageError> {
+    let (file, length) = open(path)?;
+    exr::read_state(file, length).map_err(|failure| match failure {
+        MapFailure::Malformed(reason) => ImageError::malformed(path, "OpenEXR", reason),
+        MapFailure::TooLarge { width, height } => ImageError::TooLarge {
+            path: path.to_owned(),
+            width,
+            height,
+            limit: "as many as fit the free memory with all their layers".to_owned(),
+            fix: "free some memory, or use a larger machine",
+        },
+    })
 }
 
 /// Opens a regular file; reading a pipe or device could block for ever.

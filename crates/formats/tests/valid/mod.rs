@@ -3,6 +3,7 @@
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, WritableImage, f16};
 use flate2::{Compression, write::GzEncoder, write::ZlibEncoder};
 use std::io::{Cursor, Write};
+use tyndall::film::{StateLayer, StateValues};
 use tyndall_formats::image::{Display, Metadata, Picture, write};
 
 /// A file's name and content.
@@ -303,6 +304,10 @@ pub fn pictures() -> Vec<File> {
         variance: Some(vec![[0.1; 3]; 4]),
         depth: Some(vec![1.0; 4]),
         transparent: true,
+        state: vec![
+            StateLayer { name: "samples".to_owned(), values: StateValues::Whole(vec![7; 4]) },
+            StateLayer { name: "node.0.R".to_owned(), values: StateValues::Float(vec![0.5; 4]) },
+        ],
     };
     let mut metadata = Metadata::default();
     metadata.insert(Metadata::SCENE, format!("{{\"volume\": {{\"path\": \"Schädel{}\"}}}}", " ".repeat(300)));

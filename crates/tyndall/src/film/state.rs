@@ -42,7 +42,10 @@ pub enum StateValues {
 }
 
 impl StateValues {
-    fn len(&self) -> usize {
+    /// Number of pixels.
+    #[must_use]
+    #[expect(clippy::len_without_is_empty, reason = "a picture is never empty")]
+    pub fn len(&self) -> usize {
         match self {
             Self::Float(values) => values.len(),
             Self::Whole(values) => values.len(),

@@ -169,6 +169,24 @@ pub enum MapError {
 }
 
 impl Map {
+    /// Number of columns.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Linear radiance, row by row from the top.
+    #[must_use]
+    pub fn texels(&self) -> &[Rgb] {
+        &self.texels
+    }
+
     /// Linear radiance, row by row from the top.
     ///
     /// # Errors

@@ -62,6 +62,12 @@ impl Bricks {
         (Self { samples, dims, counts, edge }, ranges)
     }
 
+    /// The samples as they are stored, brick by brick.
+    #[must_use]
+    pub fn as_bytes(&self) -> &[u8] {
+        with_voxels!(&self.samples, data => bytemuck::cast_slice(data))
+    }
+
     /// Bytes that the bricks of a grid take; `None` where the number overflows.
     #[must_use]
     pub fn bytes(dims: [usize; 3], sample: usize) -> Option<u64> {
