@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn shares_are_whole_chunks_that_cover_all_samples() {
-        for samples in [1, 16, 17, 64, 100, 1000, 1 << 31] {
+        for samples in [1_u32, 16, 17, 64, 100, 1000, 1 << 31] {
             let chunks = samples.div_ceil(Film::CHUNK);
             for of in [1, 2, 3, 4, 7, 62, 63].into_iter().filter(|&of| of <= chunks) {
                 let mut next = 0;
