@@ -185,7 +185,7 @@ fn mixtures_are_refused_by_name() {
     render(&folder, &toned);
     run(&folder, &["merge", "part1.exr", "other.exr", "part3.exr", "-o", "m.exr"]);
 
-    let merge = |files: &[&str]| [&["merge", "-o", "m.exr"], files].concat();
+    let merge = |files: &[&'static str]| [&["merge", "-o", "m.exr"], files].concat();
     refused(&folder, 1, &merge(&["part1.exr", "part2.exr", "part2.exr", "part3.exr"]), &["part 2/3, as is"]);
     refused(&folder, 1, &merge(&["part1.exr", "part3.exr"]), &["2 of 3 parts", "2/3"]);
     render(&folder, &["--part", "1/2", "-o", "half.exr"]);
