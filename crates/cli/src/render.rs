@@ -85,6 +85,13 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     }
     if let (Some(path), Some(info)) = (&options.resume, &info) {
         resume(&mut live, path, info, samples)?;
+        if live.film().samples() == samples && options.samples.is_none() && !options.run.quiet {
+            let path = path_name(path);
+            drop(writeln!(
+                std::io::stderr(),
+                "tyndall: note: {path} has the {samples} samples asked for already; ask for more with --samples"
+            ));
+        }
     }
     let stop = StopConditions {
         samples,

@@ -2,7 +2,7 @@
 
 use super::Film;
 use super::estimate::{CHUNK, QUANTITIES};
-use super::tile::StoredAt;
+use super::tile::{StoredAt, UnevenSamples};
 use super::tree::Place;
 use crate::math::cast;
 use std::collections::HashMap;
@@ -149,7 +149,13 @@ impl Film {
         let next = layers.whole(SAMPLES)?;
         let mut stored: Vec<(Place, [Values; QUANTITIES])> = Vec::new();
         for tile in &mut film.tiles {
-            tile.go_on_after(|position| next[index_of(position)])?;
+            tile.go_on_after(|position| next[index_of(position)]).map_err(
+                |UnevenSamples { position, found, expected }| StateError::Samples {
+                    position,
+                    found,
+                    expected,
+                },
+            )?;
             for StoredAt { pixel, place } in tile.stored() {
                 let index = match stored.iter().position(|(known, _)| *known == place) {
                     Some(known) => known,

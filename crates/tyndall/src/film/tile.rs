@@ -3,7 +3,6 @@
 use super::PixelSample;
 use super::estimate::Estimate;
 use super::noise::TileNoise;
-use super::state::StateError;
 use super::tone::{BATCH, Planes};
 use super::tree::{Piece, Place, Tree, pieces};
 use crate::math::cast;
@@ -301,14 +300,17 @@ impl Tile {
     }
 
     /// Continues after the samples that its pixels have: `next` is the number of the sample that a pixel of the film takes next.
-    pub(super) fn go_on_after(&mut self, next: impl Fn([u32; 2]) -> u32) -> Result<(), StateError> {
+    ///
+    /// # Errors
+    /// The first pixel, in the order in which they take their turns, that is not as far as its neighbours say.
+    pub(super) fn go_on_after(&mut self, next: impl Fn([u32; 2]) -> u32) -> Result<(), UnevenSamples> {
         let numbers: Vec<u32> = self.positions(0..self.pixel_count()).map(next).collect();
         let samples = numbers.last().copied().unwrap_or(0);
         let ahead = numbers.iter().take_while(|&&number| number > samples).count();
         for (i, (&found, position)) in numbers.iter().zip(self.positions(0..numbers.len())).enumerate() {
             let expected = if i < ahead { samples.saturating_add(1) } else { samples };
             if found != expected || found < self.first() || found > MOST_SAMPLES {
-                return Err(StateError::Samples { position, found, expected: expected.max(self.first()) });
+                return Err(UnevenSamples { position, found, expected: expected.max(self.first()) });
             }
         }
         (self.samples, self.ahead) = (samples, ahead);
@@ -329,6 +331,13 @@ impl Tile {
         self.samples = part.samples;
         self.noise = TileNoise::default();
     }
+}
+
+/// A pixel whose number of samples does not fit those of the others of its tile.
+pub(super) struct UnevenSamples {
+    pub position: [u32; 2],
+    pub found: u32,
+    pub expected: u32,
 }
 
 /// A place where samples of a pixel are stored.
