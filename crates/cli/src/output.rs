@@ -107,8 +107,8 @@ fn metadata(
     samples: Option<&StateInfo>,
 ) -> Metadata {
     let mut document = document.clone();
-    // The scene of a part is that of the whole.
-    if samples.is_none_or(|samples| samples.part.is_none()) {
+    // A picture that can go on, and a part, keep what the whole is to have.
+    if samples.is_none() {
         document.render.samples = film.samples().max(1);
     }
     let moved = |path: &mut String| *path = relocate(path, from, to);

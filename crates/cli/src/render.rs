@@ -165,10 +165,10 @@ fn resume(live: &mut LiveSession, path: &Path, info: &StateInfo, samples: u32) -
     }
     stored.check_session(info, live.document())?;
     let film = stored.film()?;
-    if film.samples() > samples {
-        let found = film.samples();
+    if film.most_samples() > samples {
+        let found = film.most_samples();
         return Err(Failure::usage(format!(
-            "{name}: has {found} samples already, more than the {samples} asked for; ask for more with --samples"
+            "{name}: has {found} samples in some pixels already, more than the {samples} asked for; ask for more with --samples"
         )));
     }
     live.go_on_with(film).map_err(Failure::input)

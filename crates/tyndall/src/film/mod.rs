@@ -184,6 +184,12 @@ impl Film {
         self.tiles.iter().map(Tile::samples).min().unwrap_or(0)
     }
 
+    /// Maximum number of samples per pixel: a stop may leave some pixels ahead of others.
+    #[must_use]
+    pub fn most_samples(&self) -> u32 {
+        self.tiles.iter().map(Tile::most_samples).max().unwrap_or(0)
+    }
+
     /// Whether every tile has come as far as a goal.
     #[must_use]
     pub fn has_reached(&self, goal: Goal) -> bool {

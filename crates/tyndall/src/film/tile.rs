@@ -128,6 +128,11 @@ impl Tile {
         self.samples
     }
 
+    /// Samples of the pixels that have most.
+    pub(super) fn most_samples(&self) -> u32 {
+        self.samples + u32::from(self.ahead > 0)
+    }
+
     /// Number of the first sample that it has, or will have.
     pub(super) fn first(&self) -> u32 {
         self.tree.first()
