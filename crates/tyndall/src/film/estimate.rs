@@ -65,10 +65,11 @@ impl Sums {
     }
 }
 
-/// The mean of `n` samples with this sum.
+/// The mean of `n` samples with this sum. Equal samples have exactly their own value as their mean, since the error of the
+/// product vanishes in single precision.
 #[inline(always)]
 pub(super) fn mean_of(sum: f64, n: f64) -> f32 {
-    cast::single(sum / n)
+    cast::single(sum * n.recip())
 }
 
 /// The mean of all samples, where `share` is the fraction of them that the second mean represents.

@@ -32,12 +32,7 @@ impl ToneCurve {
     /// Negative and undefined channels show as black, infinite ones as the brightest value.
     #[must_use]
     pub fn map(self, linear: Rgb, exposure_stops: f32) -> Rgb {
-        let mut planes = [[0.0; BATCH]; 3];
-        [planes[0][0], planes[1][0], planes[2][0]] = linear.to_array();
-        let mut codes = [[0.0; 3]];
-        let gain = exposure_stops.exp2();
-        Level::best().run(Encode { curve: self, gain, planes: &planes, codes: &mut codes });
-        Rgb::from(codes[0])
+        Level::best().run(MapOne { curve: self, linear: linear * exposure_stops.exp2() })
     }
 
     /// The same for many pixels, as the nearest of 256 code values. Every vector level gives the same bytes.
@@ -57,26 +52,6 @@ impl ToneCurve {
     }
 }
 
-/// The type of a code value.
-pub(super) trait Code: Copy {
-    /// From a value in [0, 1], and the same as one of 256 levels.
-    fn new(value: f32, level: i32) -> Self;
-}
-
-impl Code for f32 {
-    #[inline(always)]
-    fn new(value: f32, _: i32) -> Self {
-        value
-    }
-}
-
-impl Code for u8 {
-    #[inline(always)]
-    fn new(_: f32, level: i32) -> Self {
-        level.to_le_bytes()[0]
-    }
-}
-
 /// Number of pixels that are encoded at once.
 pub(super) const BATCH: usize = 256;
 
@@ -84,16 +59,16 @@ pub(super) const BATCH: usize = 256;
 pub(super) type Planes = [[f32; BATCH]; 3];
 
 /// Encodes the first pixels of a batch, a vector of them at a time.
-pub(super) struct Encode<'a, C> {
+pub(super) struct Encode<'a> {
     pub curve: ToneCurve,
     /// Multiplies the radiance.
     pub gain: f32,
     pub planes: &'a Planes,
     /// Of at most [`BATCH`] pixels.
-    pub codes: &'a mut [[C; 3]],
+    pub codes: &'a mut [[u8; 3]],
 }
 
-impl<C: Code> Kernel for Encode<'_, C> {
+impl Kernel for Encode<'_> {
     type Output = ();
 
     #[inline(always)]
@@ -101,26 +76,57 @@ impl<C: Code> Kernel for Encode<'_, C> {
         let Self { curve, gain, planes: [red, green, blue], codes } = self;
         for (batch, codes) in codes.chunks_mut(S::WIDTH).enumerate() {
             let lanes = batch * S::WIDTH..(batch + 1) * S::WIDTH;
-            let r = clip(simd, S::f32s::from_slice(simd, &red[lanes.clone()]) * gain, BRIGHTEST);
-            let g = clip(simd, S::f32s::from_slice(simd, &green[lanes.clone()]) * gain, BRIGHTEST);
-            let b = clip(simd, S::f32s::from_slice(simd, &blue[lanes]) * gain, BRIGHTEST);
-            let shown = match curve {
-                ToneCurve::Agx => agx(simd, [r, g, b]),
-                ToneCurve::Linear => encode_all(simd, [r, g, b]),
-                ToneCurve::Reinhard => {
-                    let [red, green, blue] = LUMINANCE;
-                    let white = r * red + g * green + b * blue + 1.0;
-                    encode_all(simd, [r / white, g / white, b / white])
-                }
-                ToneCurve::Aces => encode_all(simd, [aces(r), aces(g), aces(b)]),
-            };
-            for (channel, shown) in shown.into_iter().enumerate() {
-                let levels: S::i32s = (shown * 255.0 + 0.5).to_int();
-                for (lane, code) in codes.iter_mut().enumerate() {
-                    code[channel] = C::new(shown.as_slice()[lane], levels.as_slice()[lane]);
-                }
+            let r = S::f32s::from_slice(simd, &red[lanes.clone()]) * gain;
+            let g = S::f32s::from_slice(simd, &green[lanes.clone()]) * gain;
+            let b = S::f32s::from_slice(simd, &blue[lanes]) * gain;
+            let [r, g, b] = shown(simd, curve, [r, g, b]);
+            // One number for each pixel, since storing single bytes takes longer than the curve.
+            let packed = level_of::<S>(r) | level_of::<S>(g) << 8 | level_of::<S>(b) << 16;
+            for (code, packed) in codes.iter_mut().zip(packed.as_slice()) {
+                let [r, g, b, _] = packed.to_le_bytes();
+                *code = [r, g, b];
             }
         }
+    }
+}
+
+/// The nearest of 256 levels.
+#[inline(always)]
+fn level_of<S: Lanes>(shown: S::f32s) -> S::i32s {
+    (shown * 255.0 + 0.5).to_int()
+}
+
+/// Maps a single pixel.
+struct MapOne {
+    curve: ToneCurve,
+    linear: Rgb,
+}
+
+impl Kernel for MapOne {
+    type Output = Rgb;
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, simd: S) -> Rgb {
+        let Rgb { r, g, b } = self.linear;
+        let linear = [S::f32s::splat(simd, r), S::f32s::splat(simd, g), S::f32s::splat(simd, b)];
+        let [r, g, b] = shown(simd, self.curve, linear);
+        Rgb::new(r.as_slice()[0], g.as_slice()[0], b.as_slice()[0])
+    }
+}
+
+/// The code values, in [0, 1], that show a linear colour.
+#[inline(always)]
+fn shown<S: Lanes>(simd: S, curve: ToneCurve, [r, g, b]: [S::f32s; 3]) -> [S::f32s; 3] {
+    let [r, g, b] = [clip(simd, r, BRIGHTEST), clip(simd, g, BRIGHTEST), clip(simd, b, BRIGHTEST)];
+    match curve {
+        ToneCurve::Agx => agx(simd, [r, g, b]),
+        ToneCurve::Linear => encode_all(simd, [r, g, b]),
+        ToneCurve::Reinhard => {
+            let [red, green, blue] = LUMINANCE;
+            let white = r * red + g * green + b * blue + 1.0;
+            encode_all(simd, [r / white, g / white, b / white])
+        }
+        ToneCurve::Aces => encode_all(simd, [aces(r), aces(g), aces(b)]),
     }
 }
 

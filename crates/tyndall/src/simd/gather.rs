@@ -25,7 +25,7 @@ pub(crate) trait Lanes:
         let index = self.at_most(index, table.len() - 1);
         // SAFETY: the index is at most that of the last number, and each number has four bytes.
         let words = unsafe { self.gather_words::<4>(table.as_ptr().cast(), index) };
-        Self::f32s::from_bits(words)
+        words.bitcast()
     }
 
     /// The words that begin at the `index`-th number, where each number has `size` bytes; a word that would reach past

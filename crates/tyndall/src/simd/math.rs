@@ -16,8 +16,7 @@ pub(crate) fn one_minus_exp<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
         series = series.mul_add(r, S::f32s::splat(simd, coefficient));
     }
     let power: S::i32s = (n.to_int::<S::i32s>() + 127) << 23;
-    let power: S::u32s = power.bitcast();
-    let power = S::f32s::from_bits(power);
+    let power: S::f32s = power.bitcast();
     let one = S::f32s::splat(simd, 1.0);
     (one - power) - power * (series * r)
 }
@@ -31,11 +30,10 @@ const LN_2_LOW: f32 = -2.121_944_4e-4;
 pub(crate) fn log2_unfused<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
     /// Of the square root of a half, above which mantissas are taken, and below twice which.
     const ROOT: u32 = 0x3f35_04f3;
-    let bits: S::i32s = x.to_bits().bitcast();
+    let bits: S::i32s = x.bitcast();
     let root = ROOT.cast_signed();
     let exponent: S::i32s = (bits - root) >> 23;
-    let mantissa: S::u32s = (bits - (exponent << 23)).bitcast();
-    let m = S::f32s::from_bits(mantissa);
+    let m: S::f32s = (bits - (exponent << 23)).bitcast();
     // log(m) = 2 artanh((m - 1) / (m + 1)).
     let one = S::f32s::splat(simd, 1.0);
     let s = (m - one) / (m + one);
@@ -54,8 +52,8 @@ pub(crate) fn exp2_unfused<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
         series = series * r + coefficient;
     }
     let power: S::i32s = (n.to_int::<S::i32s>() + 127) << 23;
-    let power: S::u32s = power.bitcast();
-    series * S::f32s::from_bits(power)
+    let power: S::f32s = power.bitcast();
+    series * power
 }
 
 /// Unpacks [`PackedDirection`](crate::math::PackedDirection)s to unit vectors.
