@@ -2,7 +2,8 @@
 
 use crate::film::{Film, Goal, Image, Stride, Tone, Viewer};
 use crate::integrator::{
-    Edited, Engine, KeptItems, Limits, MethodReport, PixelCounts, Resources, WorkShare, method_of,
+    Edited, Engine, KeptItems, Limits, MethodReport, PixelCounts, Resources, Updated, WorkShare,
+    drop_elsewhere, method_of,
 };
 use crate::scene::{Difference, Scene};
 use crate::simd::Level;
@@ -51,6 +52,9 @@ pub struct Progress {
     pub mean_samples: f64,
     /// Fraction of the pixels that have a sample.
     pub coverage: f64,
+    /// Whether the first samples must wait: kept light has to be asked about an edit, or new light to be prepared. Later samples, which
+    /// may need more light than the first, do not count.
+    pub settling: bool,
 }
 
 /// Seconds that a stage of the work took.
@@ -73,6 +77,8 @@ struct Spent {
 /// Renders a scene on a given thread pool.
 pub struct Session {
     scene: Scene,
+    /// The scene that the engine's light belongs to, if edits have touched it since; the film is then empty.
+    unsettled: Option<Scene>,
     engine: Box<dyn Engine>,
     film: Film,
     threads: Arc<rayon::ThreadPool>,
@@ -101,33 +107,51 @@ impl Session {
     pub fn with_resources(scene: Scene, threads: Arc<rayon::ThreadPool>, resources: Resources) -> Self {
         let engine = threads.install(|| method_of(&scene.render.method).start(&scene, &resources));
         let film = Film::new(scene.size);
-        Self { engine, film, scene, threads, resources, left: 0.0, spent: Spent::default() }
+        let (left, spent) = (0.0, Spent::default());
+        Self { engine, film, scene, unsettled: None, threads, resources, left, spent }
     }
 
-    fn begin_anew(&mut self) {
-        self.film = Film::new(self.scene.size);
-        let Self { scene, threads, resources, .. } = self;
-        self.engine = threads.install(|| method_of(&scene.render.method).start(scene, resources));
-    }
-
-    /// Continues with an edited scene; returns what the edit changed. This is the only function that discards results,
-    /// and the difference alone decides which: the session then renders the same picture as a new one.
+    /// Continues with an edited scene; returns what the edit changed. Only drops the film, if the edit touched it: kept light is
+    /// asked by the next [`Self::refine`], once for all edits until then. The session then renders the same picture as a
+    /// new one.
     pub fn set_scene(&mut self, scene: Scene) -> Difference {
         let difference = Difference::between(&self.scene, &scene);
         let old = std::mem::replace(&mut self.scene, scene);
-        if self.engine.is_touched_by(&difference) {
-            self.film = Film::new(self.scene.size);
-            let Self { engine, scene, threads, .. } = self;
-            let edit = Edited { old: &old, new: scene, difference: &difference };
-            if !threads.install(|| engine.update(&edit, Film::tile_count(edit.new.size))) {
-                self.begin_anew();
-            }
-        } else {
-            self.engine.count_anew();
+        if self.unsettled.is_some() {
+            drop_elsewhere(old);
+            self.clear_film();
+        } else if self.engine.is_touched_by(&difference) {
+            self.unsettled = Some(old);
+            self.clear_film();
         }
+        self.engine.count_anew();
         self.left = self.film.mean_samples();
         self.spent = Spent::default();
         difference
+    }
+
+    fn clear_film(&mut self) {
+        drop_elsewhere(std::mem::replace(&mut self.film, Film::new(self.scene.size)));
+    }
+
+    /// Asks kept light about all edits since the last time, and drops what they affect; the difference between two scenes alone decides
+    /// what that is. False if stopped first.
+    fn settle(&mut self, limits: &Limits) -> bool {
+        let Self { scene, unsettled, engine, threads, resources, .. } = self;
+        let Some(old) = unsettled else { return true };
+        let difference = Difference::between(old, scene);
+        let edit = Edited { old, new: scene, difference: &difference };
+        let tiles = Film::tile_count(scene.size);
+        match threads.install(|| engine.update(&edit, tiles, limits)) {
+            Updated::Stopped => return false,
+            Updated::Done => {}
+            Updated::StartAnew => {
+                let start = || method_of(&scene.render.method).start(scene, resources);
+                drop_elsewhere(std::mem::replace(engine, threads.install(start)));
+            }
+        }
+        drop_elsewhere(unsettled.take());
+        true
     }
 
     /// What was computed since the last edit, or since the beginning, and what is kept for future edits.
@@ -194,6 +218,15 @@ impl Session {
     /// does not depend on threads or slices.
     pub fn refine(&mut self, budget: &Budget) -> Progress {
         let limits = Limits { cancel: &budget.cancel, deadline: budget.deadline };
+        if self.film.has_reached(budget.goal()) || limits.stop().reached() {
+            return self.progress();
+        }
+        let begun = Instant::now();
+        let settled = self.settle(&limits);
+        self.spent.preparing += begun.elapsed();
+        if !settled {
+            return self.progress();
+        }
         let Self { scene, engine, film, threads, spent, .. } = self;
         while !film.has_reached(budget.goal()) && !limits.stop().reached() {
             let so_far = film.samples();
@@ -222,6 +255,7 @@ impl Session {
             samples: self.film.samples(),
             mean_samples: self.film.mean_samples(),
             coverage: self.film.coverage(),
+            settling: self.unsettled.is_some() || self.engine.is_settling(&self.scene),
         }
     }
 
@@ -229,7 +263,8 @@ impl Session {
     /// samples differ only by the pixel filter. Visits all pixels.
     #[must_use]
     pub fn relative_error(&self) -> Option<f64> {
-        if self.engine.has_noise() { self.film.relative_error() } else { None }
+        let has_noise = method_of(&self.scene.render.method).has_noise;
+        if has_noise { self.film.relative_error() } else { None }
     }
 }
 
