@@ -8,10 +8,10 @@ pub(crate) use bounds::Moved;
 pub(crate) use packed::PackedHistories;
 pub(crate) use touched::Touched;
 
+use super::Limits;
 use super::disposal::drop_elsewhere;
-use super::{Edited, Limits};
 use crate::medium::{FlightNotes, Medium};
-use crate::transfer::{Grouping, HistoryGroups, Historygram};
+use crate::transfer::{BinSet, Grouping, HistoryGroups, Historygram};
 use crate::volume::ValueBins;
 use bounds::{Bounds, BoundsInProgress};
 
@@ -73,19 +73,15 @@ impl Reading {
         self.go_on(None, limits).is_some()
     }
 
-    /// Updates to the new scene of an edit that leaves the volume and the size of the cells unchanged; returns what flights must be
-    /// queried for besides the groups whose opacity changed. `None` if stopped first: the next call must have the same old
-    /// scene, and may have another new one.
-    pub fn update(&mut self, edit: &Edited, limits: &Limits) -> Option<Moved> {
-        let Edited { old, new, difference } = *edit;
-        let outdated = match &self.next {
-            Some(next) => !next.is_of(&new.medium),
-            None => !difference.transfer.opacity.is_empty(),
-        };
+    /// Updates to an edited medium, with the same volume and cells, whose opacity is another in the bins `changed`; returns what
+    /// flights must be queried for besides the groups of these bins. `None` if stopped first: the next call must have the same
+    /// old medium, and may have another new one.
+    pub fn update(&mut self, [old, new]: [&Medium; 2], changed: &BinSet, limits: &Limits) -> Option<Moved> {
+        let outdated = self.next.as_ref().map_or(!changed.is_empty(), |next| !next.is_of(new));
         if outdated {
-            self.next = Some(BoundsInProgress::new(&self.groups, &new.medium, self.bounds.is_empty()));
+            self.next = Some(BoundsInProgress::new(&self.groups, new, self.bounds.is_empty()));
         }
-        self.go_on(Some(&old.medium), limits)
+        self.go_on(Some(old), limits)
     }
 
     fn go_on(&mut self, old: Option<&Medium>, limits: &Limits) -> Option<Moved> {
@@ -141,5 +137,66 @@ impl FlightNotes for Writer<'_> {
     #[inline(always)]
     fn value(&mut self, value: f32) {
         self.past.flight |= self.read(value);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::medium::MediumSettings;
+    use crate::scattering::{Brdf, Phase};
+    use crate::transfer::{Optics, Point, TransferDifference, TransferFunction};
+    use crate::volume::procedural::{Field, Kind};
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
+    use std::time::{Duration, Instant};
+
+    /// Stopped again and again, and given another new medium in the middle, an update gives the query and the entries of one that never
+    /// stops.
+    #[test]
+    fn an_update_leaves_no_trace_of_stops_and_of_a_medium_that_was_not_reached() {
+        let volume = Arc::new(Field::new(Kind::Cloud, [60, 50, 40], 2).volume().expect("a field"));
+        let medium = |low: f32, high: f32| {
+            let point = |value, opacity| Point { value, optics: Optics { opacity, ..Optics::default() } };
+            let points = [(0.1, 0.0), (0.3, low), (0.35, low), (0.45, 0.2), (0.6, high), (0.7, 0.1)];
+            let points = points.map(|(value, opacity)| point(value, opacity)).to_vec();
+            let transfer = TransferFunction::over(volume.value_bins(), points).expect("a function");
+            let settings = MediumSettings {
+                density: 1.0,
+                phase: Phase::Isotropic,
+                brdf: Brdf::Lambert,
+                gradient_factor: 3.0,
+                clip: Vec::new(),
+                majorant_cell: 1,
+            };
+            Medium::new(volume.clone(), Arc::new(transfer), &settings)
+        };
+        // Where both groups occur, the first attains the majorant before, and does again at the end, below the second.
+        let (old, passing, new) = (medium(0.5, 0.3), medium(0.1, 0.3), medium(0.5, 0.9));
+        let cancel = AtomicBool::new(false);
+        let never = Limits { cancel: &cancel, deadline: None };
+        let mut stops = 0;
+        let mut soon = || {
+            stops += 1;
+            Limits { cancel: &cancel, deadline: Some(Instant::now() + Duration::from_micros(100)) }
+        };
+        let started = || Reading::new(&old, 64, Grouping::Quantile);
+        let (mut whole, mut stopped) = (started(), started());
+        assert!(!whole.is_complete() && whole.complete(&never) && whole.is_complete());
+        while !stopped.complete(&soon()) {}
+        let change =
+            |old: &Medium, new: &Medium| TransferDifference::between(old.transfer(), new.transfer()).opacity;
+        let changed = change(&old, &new);
+        let expected = whole.update([&old, &new], &changed, &never).expect("no stop");
+        assert!(!expected.raised.is_empty());
+        assert!(stopped.update([&old, &passing], &change(&old, &passing), &soon()).is_none());
+        let moved = std::iter::repeat_with(|| stopped.update([&old, &new], &changed, &soon()));
+        assert_eq!(moved.flatten().next(), Some(expected));
+        assert_eq!(whole.cells, stopped.cells);
+        for cell in 0..whole.cells.len() {
+            let of = |reading: &Reading| [reading.bounds.most(cell), reading.bounds.limits(cell)];
+            assert_eq!(of(&whole), of(&stopped), "cell {cell}");
+        }
+        assert!(stops > 10, "{stops} stops");
     }
 }

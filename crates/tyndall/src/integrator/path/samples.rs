@@ -51,7 +51,8 @@ impl SampleKeeper {
     /// The query for the kept samples after an edit that they may survive; `None` if stopped first, see [`Reading::update`].
     pub fn update(&mut self, edit: &Edited, limits: &Limits) -> Option<SampleQuery> {
         let Edited { old, new, difference } = *edit;
-        let moved = self.reading.update(edit, limits)?;
+        let media = [&*old.medium, &*new.medium];
+        let moved = self.reading.update(media, &difference.transfer.opacity, limits)?;
         let touched = Touched::new(&self.reading.groups, old, new, difference);
         let mut past = touched.paths;
         past.flight |= moved.sunk | moved.raised;

@@ -24,7 +24,8 @@ impl PhotonMapper {
             return Updated::StartAnew;
         }
         // Light paths do not read a cell's smallest opacity.
-        let Some(Moved { raised, .. }) = self.ground.reading.update(edit, limits) else {
+        let (media, reading) = ([&*old.medium, &*new.medium], &mut self.ground.reading);
+        let Some(Moved { raised, .. }) = reading.update(media, &difference.transfer.opacity, limits) else {
             return Updated::Stopped;
         };
         let mut touched = Touched::new(&self.ground.reading.groups, old, new, difference);
