@@ -4,7 +4,7 @@ use super::Row;
 use super::scenes::{Bench, cloud, ct};
 use super::timing::{Effort, median};
 use crate::Failure;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 use tyndall::integrator::{METHODS, Resources};
 use tyndall::math::{Ray, Vec3};
@@ -165,13 +165,13 @@ struct Lateness {
 }
 
 impl Lateness {
-    /// Refines in slices of 3 to 20 ms, so that deadlines fall in all stages of the work.
-    fn refine(&mut self, session: &mut Session, samples: u32, slices: u64) {
-        for slice in 0..slices {
+    /// Refines in slices of up to 20 ms, so that deadlines fall in all stages of the work.
+    fn refine(&mut self, session: &mut Session, samples: u32, slices: u32, random: &mut Stream) {
+        for _ in 0..slices {
             if session.film().samples() >= samples {
                 return;
             }
-            let deadline = Instant::now() + Duration::from_millis(3 + slice * 7 % 18);
+            let deadline = Instant::now() + Duration::from_secs_f32(0.02 * random.uniform());
             session.refine(&Budget { deadline: Some(deadline), ..Budget::samples(samples) });
             if session.film().samples() < samples {
                 self.stops.push(deadline.elapsed().as_secs_f64() * 1e3);
@@ -186,6 +186,28 @@ impl Lateness {
     }
 }
 
+/// Edits of every kind, each of a document that earlier ones have changed.
+fn edits_of_every_kind(voxels: u32) -> [Value; 9] {
+    let mut points = ct(voxels)["transfer_function"]["points"].clone();
+    points[1]["opacity"] = 0.8.into();
+    let opacity = json!({ "transfer_function": { "points": points } });
+    points[1]["albedo"] = json!([0.9, 0.5, 0.5]);
+    let sun =
+        |irradiance: f64| json!({ "type": "directional", "direction": [1, -1, 0], "irradiance": irradiance });
+    let lamp = json!({ "type": "environment", "radiance": [0.3, 0.3, 0.35] });
+    [
+        opacity,
+        json!({ "transfer_function": { "points": points } }),
+        json!({ "medium": { "density": 30.0 / f64::from(voxels) } }),
+        json!({ "lights": [sun(3.0), lamp] }),
+        json!({ "lights": [sun(2.0), lamp] }),
+        json!({ "lights": [sun(2.0)] }),
+        json!({ "camera": { "auto": { "azimuth": 70 } } }),
+        json!({ "medium": { "phase": { "type": "henyey-greenstein", "g": 0.3 } } }),
+        json!({ "render": { "max_scatter": 7 } }),
+    ]
+}
+
 /// How late each method stops, through all stages of its work, and how long it takes to accept an edit; and how long majorants
 /// take after an edit of the transfer function.
 pub fn latency(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
@@ -193,26 +215,25 @@ pub fn latency(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     const MOST_MS: f64 = 5.0;
     let voxels = effort.pick(256, 64);
     let bench = Bench::new(ct(voxels), 2)?;
-    let mut points = ct(voxels)["transfer_function"]["points"].clone();
-    points[1]["opacity"] = 0.8.into();
-    let edits = [
-        json!({ "transfer_function": { "points": points } }),
-        json!({ "medium": { "density": 0.2 } }),
-        json!({ "lights": [{ "type": "directional", "direction": [1, -1, 0], "irradiance": [3, 3, 3] }] }),
-        json!({ "camera": { "auto": { "azimuth": 70 } } }),
-    ];
     let (samples, slices) = effort.pick((3, 200), (100_000, 2));
     let mut rows = Vec::new();
     for integrator in METHODS.iter().map(|method| method.name) {
+        let mut random = Stream::new(1, [0; 3]);
         let side = effort.pick(512, 32);
-        let base = json!({ "film": { "size": [side, side] }, "render": { "integrator": integrator, "max_scatter": 8 } });
+        let mut document = json!({ "film": { "size": [side, side] }, "render": { "integrator": integrator, "max_scatter": 8 } });
         let resources = Resources { level, edit_memory: 1 << 29 };
-        let mut session = Session::with_resources(bench.scene(&base)?, bench.threads().clone(), resources);
+        let mut session =
+            Session::with_resources(bench.scene(&document)?, bench.threads().clone(), resources);
         let mut late = Lateness::default();
-        late.refine(&mut session, samples, slices);
-        for edit in &edits {
-            late.edit(&mut session, bench.scene(&document::apply(&base, edit))?);
-            late.refine(&mut session, samples, slices);
+        late.refine(&mut session, samples, slices, &mut random);
+        for edit in edits_of_every_kind(voxels) {
+            // Each edit comes twice: the first is undone and made again while the work for it is under way.
+            let after = document::apply(&document, &edit);
+            for (scene, slices) in [(&after, 4), (&document, 4), (&after, slices)] {
+                late.edit(&mut session, bench.scene(scene)?);
+                late.refine(&mut session, samples, slices, &mut random);
+            }
+            document = after;
         }
         for (what, times) in [("past the deadline", late.stops), ("to accept an edit", late.edits)] {
             let name = format!("{integrator}: {what}");

@@ -3,6 +3,7 @@
 mod live;
 mod photons;
 mod samples;
+mod stops;
 
 use serde_json::{Value, json};
 use std::collections::BTreeMap;

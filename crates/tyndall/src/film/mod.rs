@@ -202,6 +202,19 @@ impl Film {
         goals.into_iter().find(|&goal| !self.has_reached(goal))
     }
 
+    /// Number of tiles, from the first, that can come as far as a goal with at most this many samples of all their pixels; at least one that
+    /// has not come so far is among them.
+    pub(crate) fn tiles_within(&self, goal: Goal, most: u64) -> usize {
+        let mut all = 0;
+        let exceeds = |tile: &Tile| {
+            let due = tile.taken_at(goal).saturating_sub(tile.taken()) as u64;
+            let is_first = all == 0;
+            all += due;
+            all > most && !is_first
+        };
+        self.tiles.iter().position(exceeds).unwrap_or(self.tiles.len())
+    }
+
     /// Fraction of the pixels that have a sample.
     #[must_use]
     pub fn coverage(&self) -> f64 {

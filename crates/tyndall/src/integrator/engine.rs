@@ -1,9 +1,10 @@
 //! The type-erased interface of a running method, which a session drives.
 
 use super::Limits;
+use super::disposal::drop_elsewhere;
 use super::method::{
     Chosen, Edited, KeptItems, MemoryNeed, Method, MethodReport, MovedKey, PixelCounts, Resources,
-    SettingProblem,
+    SettingProblem, Updated,
 };
 use crate::film::{Film, Goal};
 use crate::scene::{Difference, MethodChoice, Scene};
@@ -15,22 +16,22 @@ use serde_json::Value;
 pub(crate) trait Engine: Send + Sync {
     /// See [`Method::is_touched_by`].
     fn is_touched_by(&self, difference: &Difference) -> bool;
-    /// See [`Method::update`]; `tiles` is the film's new number of tiles.
-    fn update(&mut self, edit: &Edited, tiles: usize) -> bool;
+    /// See [`Method::update`]; starts anew if the edit selects another method. `tiles` is the film's new number of tiles.
+    fn update(&mut self, edit: &Edited, tiles: usize, limits: &Limits) -> Updated;
+    /// See [`Method::is_settling`].
+    fn is_settling(&self, scene: &Scene) -> bool;
     /// See [`Method::count_anew`].
     fn count_anew(&mut self);
     /// See [`Method::prepare`].
     fn prepare(&mut self, scene: &Scene, sample: u32, limits: &Limits) -> bool;
     /// See [`Method::samples_at_once`].
     fn samples_at_once(&self) -> u32;
-    /// See [`Method::refine`]; refines all tiles, in parallel on the current pool.
-    fn refine(&mut self, scene: &Scene, film: &mut Film, goal: Goal, limits: &Limits);
+    /// See [`Method::refine`]; refines the first `tiles` tiles, or all, in parallel on the current pool.
+    fn refine(&mut self, scene: &Scene, film: &mut Film, goal: Goal, tiles: usize, limits: &Limits);
     /// See [`Method::report`].
     fn report(&self, pixels: &PixelCounts) -> MethodReport;
     /// See [`Method::kept_items`].
     fn kept_items(&self) -> Option<Box<dyn KeptItems>>;
-    /// See [`Method::HAS_NOISE`].
-    fn has_noise(&self) -> bool;
 }
 
 /// A method with its states of the film's tiles.
@@ -44,9 +45,22 @@ impl<M: Method> Engine for Driver<M> {
         self.method.is_touched_by(difference)
     }
 
-    fn update(&mut self, edit: &Edited, tiles: usize) -> bool {
-        self.tiles.resize_with(tiles, M::TileState::default);
-        !edit.difference.method && self.method.update(edit, &mut self.tiles)
+    fn update(&mut self, edit: &Edited, tiles: usize, limits: &Limits) -> Updated {
+        if edit.difference.method {
+            return Updated::StartAnew;
+        }
+        let updated = self.method.update(edit, &mut self.tiles, limits);
+        if updated == Updated::Done {
+            if tiles < self.tiles.len() {
+                drop_elsewhere(self.tiles.split_off(tiles));
+            }
+            self.tiles.resize_with(tiles, M::TileState::default);
+        }
+        updated
+    }
+
+    fn is_settling(&self, scene: &Scene) -> bool {
+        self.method.is_settling(scene)
     }
 
     fn count_anew(&mut self) {
@@ -61,9 +75,10 @@ impl<M: Method> Engine for Driver<M> {
         self.method.samples_at_once()
     }
 
-    fn refine(&mut self, scene: &Scene, film: &mut Film, goal: Goal, limits: &Limits) {
+    fn refine(&mut self, scene: &Scene, film: &mut Film, goal: Goal, tiles: usize, limits: &Limits) {
         let (method, whole) = (&self.method, film.measured_luminance());
-        film.tiles_mut().par_iter_mut().zip(&mut self.tiles).with_max_len(1).for_each(|(tile, state)| {
+        let work = film.tiles_mut().par_iter_mut().zip(&mut self.tiles).take(tiles);
+        work.with_max_len(1).for_each(|(tile, state)| {
             let stop = limits.stop();
             if !tile.has_reached(goal) && !stop.reached() {
                 method.refine(scene, tile, state, goal, &stop);
@@ -78,10 +93,6 @@ impl<M: Method> Engine for Driver<M> {
 
     fn kept_items(&self) -> Option<Box<dyn KeptItems>> {
         self.method.kept_items(&self.tiles)
-    }
-
-    fn has_noise(&self) -> bool {
-        M::HAS_NOISE
     }
 }
 

@@ -79,14 +79,20 @@ pub trait Method: Sized + Send + Sync + 'static {
     /// Whether samples taken before an edit may differ, even by one bit, from those that would be taken now.
     fn is_touched_by(&self, difference: &Difference) -> bool;
 
-    /// Updates to an edited scene, for an edit that touches the method but not its settings. Keeps what is still valid
-    /// of its own state and of the tiles'; false if nothing is, and the method must be created again.
-    fn update(&mut self, edit: &Edited, tiles: &mut [Self::TileState]) -> bool {
-        let _ = (edit, tiles);
+    /// Updates to an edited scene, for an edit that touches the method but not its settings, or for several such edits at once.
+    /// Keeps what is still valid of its own state and of the tiles'. Must not take long, but for what `limits` can stop.
+    fn update(&mut self, edit: &Edited, tiles: &mut [Self::TileState], limits: &Limits) -> Updated {
+        let _ = (edit, tiles, limits);
+        Updated::StartAnew
+    }
+
+    /// Whether the first sample of a pixel must wait for [`Self::prepare`].
+    fn is_settling(&self, scene: &Scene) -> bool {
+        let _ = scene;
         false
     }
 
-    /// Resets the counts of what was computed, after an edit that did not touch the method.
+    /// Resets the counts of what was computed, at every edit.
     fn count_anew(&mut self, tiles: &mut [Self::TileState]) {
         let _ = tiles;
     }
@@ -169,6 +175,18 @@ pub struct Edited<'a> {
     pub new: &'a Scene,
     /// What changed.
     pub difference: &'a Difference,
+}
+
+/// What came of updating a method to an edited scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Updated {
+    /// It is up to date, and has kept what is still valid.
+    Done,
+    /// It was stopped first. The next call has the same old scene, to which all that is kept still belongs, but may have another new
+    /// scene.
+    Stopped,
+    /// Nothing is valid: the method must be created again.
+    StartAnew,
 }
 
 /// A key of a method's table that has moved elsewhere in the document.

@@ -4,6 +4,7 @@
 //! command line, scene document, sessions, tests and continuous integration iterate over [`METHODS`].
 
 mod cells;
+mod disposal;
 mod engine;
 mod history;
 mod light_paths;
@@ -19,11 +20,12 @@ pub mod raymarch;
 #[cfg(test)]
 mod plain;
 
+pub(crate) use disposal::drop_elsewhere;
 pub(crate) use engine::Engine;
 pub use engine::MethodEntry;
 pub use method::{
     Edited, ItemChanges, KeptCount, KeptItems, MemoryNeed, Method, MethodReport, MovedKey, NamedCount,
-    PixelCounts, Resources, SettingProblem, StageNames, WorkShare,
+    PixelCounts, Resources, SettingProblem, StageNames, Updated, WorkShare,
 };
 pub use stop::{Limits, Stop};
 

@@ -2,7 +2,8 @@
 
 use crate::film::{Film, Goal, Image, Stride, Tone, Viewer};
 use crate::integrator::{
-    Edited, Engine, KeptItems, Limits, MethodReport, PixelCounts, Resources, WorkShare, method_of,
+    Edited, Engine, KeptItems, Limits, MethodReport, PixelCounts, Resources, Updated, WorkShare,
+    drop_elsewhere, method_of,
 };
 use crate::scene::{Difference, Scene};
 use crate::simd::Level;
@@ -17,7 +18,10 @@ pub struct Budget {
     pub samples: u32,
     /// Pixels that are to have one sample more.
     pub more: Option<Stride>,
-    /// Time at which to stop; some pixels may then have one sample more than others.
+    /// Most samples to take in this slice, of all pixels together. Where it stops does not depend on threads; a slice takes a turn of at
+    /// least one tile, which is up to 192 samples.
+    pub pixel_samples: Option<u64>,
+    /// Time at which to stop; some pixels may then have more samples than others.
     pub deadline: Option<Instant>,
     /// Set by another thread to stop soon.
     pub cancel: Arc<AtomicBool>,
@@ -27,7 +31,7 @@ impl Budget {
     /// This many samples in every pixel, without a time limit.
     #[must_use]
     pub fn samples(samples: u32) -> Self {
-        Self { samples, more: None, deadline: None, cancel: Arc::default() }
+        Self { samples, more: None, pixel_samples: None, deadline: None, cancel: Arc::default() }
     }
 
     /// The first sample of some pixels: a coarse picture.
@@ -55,6 +59,9 @@ pub struct Progress {
     pub coverage: f64,
     /// Noise of the picture, see [`Film::measured_error`]; `None` for a method without noise.
     pub relative_error: Option<f64>,
+    /// Whether the first samples must wait: kept light has to be asked about an edit, or new light to be prepared. Later samples, which
+    /// may need more light than the first, do not count.
+    pub settling: bool,
 }
 
 /// Seconds that a stage of the work took.
@@ -77,6 +84,8 @@ struct Spent {
 /// Renders a scene on a given thread pool.
 pub struct Session {
     scene: Scene,
+    /// The scene that the engine's light belongs to, if edits have touched it since; the film is then empty.
+    unsettled: Option<Scene>,
     engine: Box<dyn Engine>,
     film: Film,
     threads: Arc<rayon::ThreadPool>,
@@ -105,33 +114,55 @@ impl Session {
     pub fn with_resources(scene: Scene, threads: Arc<rayon::ThreadPool>, resources: Resources) -> Self {
         let engine = threads.install(|| method_of(&scene.render.method).start(&scene, &resources));
         let film = Film::new(scene.size);
-        Self { engine, film, scene, threads, resources, left: 0.0, spent: Spent::default() }
+        let (left, spent) = (0.0, Spent::default());
+        Self { engine, film, scene, unsettled: None, threads, resources, left, spent }
     }
 
-    fn begin_anew(&mut self) {
-        self.film = Film::new(self.scene.size);
-        let Self { scene, threads, resources, .. } = self;
-        self.engine = threads.install(|| method_of(&scene.render.method).start(scene, resources));
-    }
-
-    /// Continues with an edited scene; returns what the edit changed. This is the only function that discards results,
-    /// and the difference alone decides which: the session then renders the same picture as a new one.
+    /// Continues with an edited scene; returns what the edit changed. Only drops the film, if the edit touched it: kept light is
+    /// asked by the next [`Self::refine`], once for all edits until then. The session then renders the same picture as a
+    /// new one.
     pub fn set_scene(&mut self, scene: Scene) -> Difference {
         let difference = Difference::between(&self.scene, &scene);
         let old = std::mem::replace(&mut self.scene, scene);
-        if self.engine.is_touched_by(&difference) {
-            self.film = Film::new(self.scene.size);
-            let Self { engine, scene, threads, .. } = self;
-            let edit = Edited { old: &old, new: scene, difference: &difference };
-            if !threads.install(|| engine.update(&edit, Film::tile_count(edit.new.size))) {
-                self.begin_anew();
-            }
-        } else {
-            self.engine.count_anew();
+        if self.unsettled.is_some() {
+            drop_elsewhere(old);
+            self.clear_film();
+        } else if self.engine.is_touched_by(&difference) {
+            self.unsettled = Some(old);
+            self.clear_film();
         }
+        self.engine.count_anew();
         self.left = self.film.mean_samples();
         self.spent = Spent::default();
         difference
+    }
+
+    fn clear_film(&mut self) {
+        if self.film.size() == self.scene.size {
+            self.film.clear();
+        } else {
+            drop_elsewhere(std::mem::replace(&mut self.film, Film::new(self.scene.size)));
+        }
+    }
+
+    /// Asks kept light about all edits since the last time, and drops what they affect; the difference between two scenes alone decides
+    /// what that is. False if stopped first.
+    fn settle(&mut self, limits: &Limits) -> bool {
+        let Self { scene, unsettled, engine, threads, resources, .. } = self;
+        let Some(old) = unsettled else { return true };
+        let difference = Difference::between(old, scene);
+        let edit = Edited { old, new: scene, difference: &difference };
+        let tiles = Film::tile_count(scene.size);
+        match threads.install(|| engine.update(&edit, tiles, limits)) {
+            Updated::Stopped => return false,
+            Updated::Done => {}
+            Updated::StartAnew => {
+                let start = || method_of(&scene.render.method).start(scene, resources);
+                drop_elsewhere(std::mem::replace(engine, threads.install(start)));
+            }
+        }
+        drop_elsewhere(unsettled.take());
+        true
     }
 
     /// What was computed since the last edit, or since the beginning, and what is kept for future edits.
@@ -208,8 +239,22 @@ impl Session {
     /// does not depend on threads or slices.
     pub fn refine(&mut self, budget: &Budget) -> Progress {
         let limits = Limits { cancel: &budget.cancel, deadline: budget.deadline };
+        if self.film.has_reached(budget.goal()) || limits.stop().reached() {
+            return self.progress();
+        }
+        let begun = Instant::now();
+        let settled = self.settle(&limits);
+        self.spent.preparing += begun.elapsed();
+        if !settled {
+            return self.progress();
+        }
         let Self { scene, engine, film, threads, spent, .. } = self;
+        let end = budget.pixel_samples.map(|most| film.pixel_samples().saturating_add(most));
         while !film.has_reached(budget.goal()) && !limits.stop().reached() {
+            let left = end.map(|end| end.saturating_sub(film.pixel_samples()));
+            if left == Some(0) {
+                break;
+            }
             let so_far = film.samples();
             let begun = Instant::now();
             let prepared = threads.install(|| engine.prepare(scene, so_far, &limits));
@@ -218,13 +263,15 @@ impl Session {
                 break;
             }
             // Later, several passes at once do not delay the picture noticeably, and threads wait less for each other.
-            let passes = (so_far / 4).clamp(1, 16).min(engine.samples_at_once());
+            let passes =
+                if left.is_some() { 1 } else { (so_far / 4).clamp(1, 16).min(engine.samples_at_once()) };
             let pass = Goal::samples(so_far.saturating_add(passes));
             let is_first = so_far == film.first();
             let next = if is_first { film.coarse_goal().unwrap_or(pass) } else { pass };
             let goal = if next.is_beyond(budget.goal()) { budget.goal() } else { next };
             let begun = Instant::now();
-            threads.install(|| engine.refine(scene, film, goal, &limits));
+            let tiles = left.map_or(usize::MAX, |left| film.tiles_within(goal, left));
+            threads.install(|| engine.refine(scene, film, goal, tiles, &limits));
             spent.sampling += begun.elapsed();
         }
         self.progress()
@@ -238,7 +285,8 @@ impl Session {
             pixel_samples: self.film.pixel_samples(),
             mean_samples: self.film.mean_samples(),
             coverage: self.film.coverage(),
-            relative_error: self.film.measured_error().filter(|_| self.engine.has_noise()),
+            relative_error: self.film.measured_error().filter(|_| self.has_noise()),
+            settling: self.unsettled.is_some() || self.engine.is_settling(&self.scene),
         }
     }
 
@@ -246,7 +294,11 @@ impl Session {
     /// samples differ only by the pixel filter. Visits all pixels.
     #[must_use]
     pub fn relative_error(&self) -> Option<f64> {
-        if self.engine.has_noise() { self.film.relative_error() } else { None }
+        if self.has_noise() { self.film.relative_error() } else { None }
+    }
+
+    fn has_noise(&self) -> bool {
+        method_of(&self.scene.render.method).has_noise
     }
 }
 

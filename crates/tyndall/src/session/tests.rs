@@ -106,3 +106,30 @@ fn every_method_follows_every_other() {
         }
     }
 }
+
+/// Budgets count samples of pixels: where a slice stops does not depend on threads.
+#[test]
+fn a_slice_takes_no_more_samples_than_its_budget() {
+    let one = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread"));
+    for method in METHODS {
+        let scene = scene(method.draft(&method.default_settings()), 1.0);
+        let resources = Resources { level: Level::best(), edit_memory: 0 };
+        let mut sessions =
+            [&THREADS, &one].map(|pool| Session::with_resources(scene.clone(), pool.clone(), resources));
+        let mut all = 0;
+        for most in [0, 1, 100, 300, 5, 1000] {
+            let budget = Budget { pixel_samples: Some(most), ..Budget::samples(3) };
+            let [progress, alone] = sessions.each_mut().map(|session| session.refine(&budget));
+            assert_eq!(progress, alone, "{}", method.name);
+            let taken = progress.pixel_samples - all;
+            all = progress.pixel_samples;
+            // The first turn of a tile, of which there are four: at least one sample of 64, and at most 192.
+            assert!(
+                taken <= most.max(192) && (taken > 0 || most == 0 || progress.samples == 3),
+                "{taken} of {most}"
+            );
+        }
+        let [found, alone] = sessions.each_mut().map(refined);
+        assert!(found == alone && sessions[0].progress().pixel_samples == sessions[0].film().pixel_samples());
+    }
+}

@@ -7,10 +7,11 @@
 use super::BinSet;
 use crate::math::cast;
 use crate::volume::{ValueBins, Volume};
+use bytemuck::Zeroable;
 use std::ops::{BitAnd, BitOr, BitOrAssign};
 
 /// A set of groups of data values; one bit each, at most 128.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Zeroable)]
 pub struct Historygram(u128);
 
 impl Historygram {

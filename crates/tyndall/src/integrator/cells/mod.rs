@@ -6,7 +6,7 @@ mod sorted;
 
 pub(crate) use grid::CellGrid;
 pub(crate) use marks::ChangeMarks;
-pub(crate) use sorted::{CellSort, CellStarts, KEY_BYTES, SortedItems};
+pub(crate) use sorted::{CellSort, CellStarts, KEY_BYTES, SortedAddresses, SortedItems};
 
 use crate::math::Vec3;
 

@@ -1,7 +1,7 @@
 //! Sorting items by grid cell, in pieces, so that a stop takes effect soon and the work can be resumed.
 
 use super::{CellGrid, Positioned};
-use crate::integrator::Limits;
+use crate::integrator::{Limits, drop_elsewhere};
 use crate::math::cast;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -30,9 +30,13 @@ impl CellStarts {
 /// not depend on when the items were computed.
 #[derive(Debug, PartialEq)]
 pub(crate) struct SortedItems {
-    keys: Vec<u64>,
+    pub items: SortedAddresses,
     pub starts: CellStarts,
 }
+
+/// Where sorted items are in their lists.
+#[derive(Debug, PartialEq)]
+pub(crate) struct SortedAddresses(Vec<u64>);
 
 /// Where an item is in the lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,16 +58,19 @@ const BLOCK: usize = 1 << 15;
 /// Maximum number of items of a range of cells, unless a single cell has more.
 const RANGE: u32 = 1 << 12;
 
-impl SortedItems {
+/// Cells that are counted up at once: some tenths of a millisecond's work.
+const PIECE: usize = 1 << 16;
+
+impl SortedAddresses {
     /// Number of items.
     pub fn len(&self) -> usize {
-        self.keys.len()
+        self.0.len()
     }
 
     /// The address of the `i`-th item in sorted order.
     #[inline]
     pub fn address(&self, i: usize) -> ItemAddress {
-        let key = self.keys[i];
+        let key = self.0[i];
         ItemAddress {
             list: cast::low_u32(key >> INDEX_BITS & ((1 << LIST_BITS) - 1)) as usize,
             index: cast::low_u32(key & ((1 << INDEX_BITS) - 1)) as usize,
@@ -78,9 +85,10 @@ pub(crate) struct CellSort {
     blocks: Vec<Block>,
     counts: Vec<AtomicU32>,
     ranges: Vec<CellRange>,
+    /// The index at which each cell begins, as far as it has been computed.
+    starts: Vec<u32>,
     /// The result; empty until the ranges are known.
     keys: Vec<u64>,
-    starts: Vec<u32>,
 }
 
 /// Lists that are sorted together.
@@ -118,8 +126,8 @@ impl CellSort {
         }
         assert!(end < 1 << LIST_BITS, "{end} lists");
         blocks.push(Block { lists: first..end, keys: None });
-        let counts = std::iter::repeat_with(AtomicU32::default).take(grid.len()).collect();
-        Self { blocks, counts, ranges: Vec::new(), keys: Vec::new(), starts: Vec::new() }
+        let counts = bytemuck::zeroed_vec(grid.len());
+        Self { blocks, counts, starts: Vec::new(), keys: Vec::new(), ranges: Vec::new() }
     }
 
     /// Continues the sort, in parallel on the current pool; `None` if stopped first. The lists must be the same in every call.
@@ -138,27 +146,43 @@ impl CellSort {
         if self.blocks.iter().any(|block| block.keys.is_none()) {
             return None;
         }
-        if self.starts.is_empty() {
+        if self.ranges.is_empty() {
+            if !self.count_up(limits) {
+                return None;
+            }
             self.divide();
         }
         self.sort_ranges(limits);
         self.ranges.iter().all(|range| range.sorted).then(|| SortedItems {
-            keys: std::mem::take(&mut self.keys),
+            items: SortedAddresses(std::mem::take(&mut self.keys)),
             starts: CellStarts(std::mem::take(&mut self.starts)),
         })
     }
 
-    /// Computes the index at which each cell begins, and divides the cells into ranges.
-    fn divide(&mut self) {
-        let mut sum = 0;
-        self.starts.reserve_exact(self.counts.len() + 1);
-        self.starts.push(0);
-        for count in &self.counts {
-            sum += count.load(Ordering::Relaxed);
-            self.starts.push(sum);
+    /// Computes the index at which each cell begins; false if stopped first.
+    fn count_up(&mut self, limits: &Limits) -> bool {
+        let stop = limits.stop();
+        if self.starts.is_empty() {
+            self.starts.reserve_exact(self.counts.len() + 1);
+            self.starts.push(0);
         }
-        self.keys = vec![0; sum as usize];
-        self.counts = Vec::new();
+        let mut sum = self.starts[self.starts.len() - 1];
+        for counts in self.counts[self.starts.len() - 1..].chunks(PIECE) {
+            if stop.reached_now() {
+                return false;
+            }
+            self.starts.extend(counts.iter().map(|count| {
+                sum += count.load(Ordering::Relaxed);
+                sum
+            }));
+        }
+        true
+    }
+
+    /// Divides the cells into ranges.
+    fn divide(&mut self) {
+        drop_elsewhere(std::mem::take(&mut self.counts));
+        self.keys = vec![0; self.starts[self.starts.len() - 1] as usize];
         let mut first = 0;
         while first + 1 < self.starts.len() {
             let begins = self.starts[first];
@@ -269,11 +293,11 @@ mod tests {
         let sort = || CellSort::new(&grid, lists.iter().map(|list| list.len()));
         let whole = sort().go_on(&grid, &lists, &Limits { cancel: &cancel, deadline: None }).unwrap();
         for (i, (cell, list, index)) in expected.iter().enumerate() {
-            assert_eq!(whole.address(i), ItemAddress { list: *list, index: *index });
+            assert_eq!(whole.items.address(i), ItemAddress { list: *list, index: *index });
             let starts = &whole.starts.0;
             assert!((starts[*cell] as usize..starts[cell + 1] as usize).contains(&i), "item {i}");
         }
-        assert_eq!((whole.len(), whole.starts.0.len()), (expected.len(), grid.len() + 1));
+        assert_eq!((whole.items.len(), whole.starts.0.len()), (expected.len(), grid.len() + 1));
         let (mut stopped, mut slices) = (sort(), 0);
         let sorted = loop {
             slices += 1;
@@ -287,6 +311,6 @@ mod tests {
         assert_eq!(sorted, whole);
         let none =
             CellSort::new(&grid, []).go_on::<Vec3>(&grid, &[], &Limits { cancel: &cancel, deadline: None });
-        assert_eq!(none.unwrap().len(), 0);
+        assert_eq!(none.unwrap().items.len(), 0);
     }
 }

@@ -7,21 +7,27 @@
 //! recorded the same way.
 
 use super::touched::around;
-use crate::medium::{MajorantGrid, Medium};
+use crate::integrator::Limits;
+use crate::medium::Medium;
 use crate::transfer::{HistoryGroups, Historygram, TransferFunction};
-use crate::volume::ValueBins;
+use crate::volume::{Cells, ValueBins};
+use bytemuck::Zeroable;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Bounds of an opacity's rounding error, relative and absolute; because of this margin a few too many groups count as
 /// attaining a bound.
 const ROUNDING: (f32, f32) = (1e-4, 1e-6);
 
+/// Cells that are computed at once: some tenths of a millisecond's work.
+const PIECE: usize = 1 << 12;
+
 /// For each majorant cell, the groups that determine its limits.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Bounds(Vec<Attained>);
 
 /// Groups of values that attain the opacity limits of a cell.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Zeroable)]
 struct Attained {
     least: Historygram,
     /// For an empty cell, all groups of values that can occur in it.
@@ -29,19 +35,9 @@ struct Attained {
 }
 
 impl Bounds {
-    /// The bounds of a medium; `cells` gives the groups of values that can occur in each majorant cell.
-    pub fn new(groups: &HistoryGroups, cells: &[Historygram], medium: &Medium) -> Self {
-        let limits = limits(groups, medium.transfer());
-        let (share, absolute) = ROUNDING;
-        let groups_where = |attains: &dyn Fn([f32; 2]) -> bool| {
-            let bits = limits.iter().enumerate().map(|(group, &limits)| u128::from(attains(limits)) << group);
-            Historygram::from_bits(bits.fold(0, |bits, bit| bits | bit))
-        };
-        let of_cell = |(&cell, &[least, most]): (&Historygram, &[f32; 2])| Attained {
-            least: cell & groups_where(&|[lo, _]| lo <= least * (1.0 + share) + absolute),
-            most: cell & groups_where(&|[_, hi]| most <= 0.0 || hi >= most * (1.0 - share) - absolute),
-        };
-        Self(cells.par_iter().zip(medium.majorants().opacities()).map(of_cell).collect())
+    /// Whether they have not been computed yet.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 
     /// The groups on which a cell's majorant depends.
@@ -56,30 +52,150 @@ impl Bounds {
         let Attained { least, most } = self.0[cell];
         least | most
     }
+}
 
-    /// Groups that an edit must query besides those whose opacity it changed: groups of cells whose smallest opacity
-    /// falls, and of cells whose majorant rises. For empty cells the changed groups suffice.
-    pub fn moved(&self, old: &MajorantGrid, new: &MajorantGrid) -> [Historygram; 2] {
-        let mut query = [Historygram::EMPTY; 2];
-        for ((old, new), attained) in old.opacities().iter().zip(new.opacities()).zip(&self.0) {
-            if new[0] < old[0] {
-                query[0] |= attained.least;
-            }
-            if old[1] > 0.0 && new[1] > old[1] {
-                query[1] |= attained.most;
-            }
-        }
-        query
+/// The bounds of a medium being computed, piece by piece, so that a stop takes effect soon and the work can be resumed.
+#[derive(Debug)]
+pub(super) struct BoundsInProgress {
+    medium: Medium,
+    /// The values in each cell, if it is to be computed too which groups these are in.
+    values: Option<Arc<Cells>>,
+    limits: GroupLimits,
+    bounds: Bounds,
+    /// What each piece must be queried for, see [`Moved`]; `None` until it is computed.
+    moved: Vec<Option<Moved>>,
+}
+
+/// What an edit must query besides the groups whose opacity it changed. For empty cells the changed groups suffice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Moved {
+    /// The groups that attained the smallest opacity of cells where it falls.
+    pub sunk: Historygram,
+    /// The groups that attained the majorant of cells where it rises.
+    pub raised: Historygram,
+}
+
+impl Moved {
+    fn with(self, other: Self) -> Self {
+        Self { sunk: self.sunk | other.sunk, raised: self.raised | other.raised }
     }
 }
 
-/// Smallest and largest opacity of each group's values.
-fn limits(groups: &HistoryGroups, transfer: &TransferFunction) -> Vec<[f32; 2]> {
-    let mut limits = vec![[f32::INFINITY, 0.0_f32]; usize::from(groups.count())];
-    for bin in 0..ValueBins::COUNT {
-        let [least, most] = transfer.opacity_range(around(transfer, bin));
-        let [lo, hi] = &mut limits[usize::from(groups.of_bins()[bin])];
-        (*lo, *hi) = (lo.min(least), hi.max(most));
+impl BoundsInProgress {
+    /// The bounds of a medium, with nothing computed yet; `with_groups` if the groups in each cell are to be computed too.
+    pub fn new(groups: &HistoryGroups, medium: &Medium, with_groups: bool) -> Self {
+        let cells = medium.majorants().opacities().len();
+        Self {
+            medium: medium.clone(),
+            values: with_groups.then(|| medium.volume().cells_of(medium.majorants().voxels())),
+            limits: GroupLimits::new(groups, medium.transfer()),
+            bounds: Bounds(bytemuck::zeroed_vec(cells)),
+            moved: vec![None; cells.div_ceil(PIECE)],
+        }
     }
-    limits
+
+    /// Whether these are the bounds of a medium.
+    pub fn is_of(&self, medium: &Medium) -> bool {
+        self.medium.shares_matter(medium)
+    }
+
+    /// Continues, in parallel on the current pool; `before` has the medium of an edit's old scene and its bounds, and must be the
+    /// same in every call. `cells` has the groups of values that can occur in each cell.
+    /// Returns what an edit must query, or `None` if stopped first.
+    pub fn go_on(
+        &mut self,
+        groups: &HistoryGroups,
+        cells: &mut [Historygram],
+        before: Option<(&Medium, &Bounds)>,
+        limits: &Limits,
+    ) -> Option<Moved> {
+        let Self { medium, values, limits: of_groups, bounds, moved } = self;
+        let (bins, opacities) = (medium.transfer().bins(), medium.majorants().opacities());
+        let pieces = (bounds.0.par_chunks_mut(PIECE), cells.par_chunks_mut(PIECE), moved.par_iter_mut());
+        pieces.into_par_iter().enumerate().with_max_len(1).for_each(|(piece, (attained, cells, moved))| {
+            if moved.is_some() || limits.stop().reached() {
+                return;
+            }
+            let first = piece * PIECE;
+            let mut query = Moved::default();
+            for (i, (attained, in_cell)) in attained.iter_mut().zip(cells).enumerate() {
+                let (cell, new) = (first + i, opacities[first + i]);
+                if let Some((old_medium, old_bounds)) = before {
+                    let (old, of_old) = (old_medium.majorants().opacities()[cell], old_bounds.0[cell]);
+                    if new[0] < old[0] {
+                        query.sunk |= of_old.least;
+                    }
+                    if old[1] > 0.0 && new[1] > old[1] {
+                        query.raised |= of_old.most;
+                    }
+                }
+                if let Some(values) = &*values {
+                    let [lo, hi] = values.ranges()[cell];
+                    *in_cell = groups.between(bins.bin(lo), bins.bin(hi));
+                }
+                *attained = of_groups.attained(*in_cell, new);
+            }
+            *moved = Some(query);
+        });
+        moved.iter().copied().try_fold(Moved::default(), |all, moved| Some(all.with(moved?)))
+    }
+
+    /// The bounds, once they are complete.
+    pub fn finished(self) -> Bounds {
+        self.bounds
+    }
+}
+
+/// The smallest and the largest opacity of each group's values, sorted, so that few comparisons find all groups that attain
+/// a bound.
+#[derive(Debug)]
+struct GroupLimits {
+    /// Ascending, and for each number of them the set of these groups.
+    least: Vec<f32>,
+    first_least: Vec<Historygram>,
+    /// Ascending, and for each number of them the set of all other groups.
+    most: Vec<f32>,
+    but_first_most: Vec<Historygram>,
+}
+
+impl GroupLimits {
+    fn new(groups: &HistoryGroups, transfer: &TransferFunction) -> Self {
+        let mut limits = vec![[f32::INFINITY, 0.0_f32]; usize::from(groups.count())];
+        for bin in 0..ValueBins::COUNT {
+            let [least, most] = transfer.opacity_range(around(transfer, bin));
+            let [lo, hi] = &mut limits[usize::from(groups.of_bins()[bin])];
+            (*lo, *hi) = (lo.min(least), hi.max(most));
+        }
+        let sorted = |end: usize| {
+            let of_group = |(group, limits): (usize, &[f32; 2])| (limits[end], 1_u128 << group);
+            let mut sorted: Vec<(f32, u128)> = limits.iter().enumerate().map(of_group).collect();
+            sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+            sorted
+        };
+        let (least, most) = (sorted(0), sorted(1));
+        let joined = |bits: &mut u128, bit: u128| {
+            *bits |= bit;
+            Some(Historygram::from_bits(*bits))
+        };
+        let first = |sorted: &[(f32, u128)]| {
+            let bits = std::iter::once(0).chain(sorted.iter().map(|limit| limit.1));
+            bits.scan(0, |bits, bit| joined(bits, bit)).collect::<Vec<_>>()
+        };
+        let first_least = first(&least);
+        let reversed: Vec<_> = most.iter().rev().copied().collect();
+        let but_first_most = first(&reversed).into_iter().rev().collect();
+        let values = |sorted: Vec<(f32, u128)>| sorted.into_iter().map(|limit| limit.0).collect();
+        Self { least: values(least), first_least, most: values(most), but_first_most }
+    }
+
+    /// The groups that attain the limits of a cell, out of those that can occur in it.
+    #[inline]
+    fn attained(&self, in_cell: Historygram, [least, most]: [f32; 2]) -> Attained {
+        let (share, absolute) = ROUNDING;
+        let low = least * (1.0 + share) + absolute;
+        let low = self.first_least[self.least.partition_point(|&lo| lo <= low)];
+        let high = most * (1.0 - share) - absolute;
+        let high = if most <= 0.0 { 0 } else { self.most.partition_point(|&hi| hi < high) };
+        Attained { least: in_cell & low, most: in_cell & self.but_first_most[high] }
+    }
 }

@@ -23,6 +23,11 @@ impl PackedHistories {
         Self { words: vec![0; width * count], width }
     }
 
+    /// Changes their number; further ones are empty.
+    pub fn resize(&mut self, count: usize) {
+        self.words.resize(self.width * count, 0);
+    }
+
     #[inline]
     pub fn push(&mut self, history: Historygram) {
         let bits = history.bits();

@@ -22,6 +22,8 @@ pub(crate) struct Chunk<V> {
     traced: Traced<V>,
     /// What has changed since they were traced.
     changed: Past,
+    /// Whether the flux of all vertices has changed, and their positions are yet to be marked.
+    reweighed: bool,
     /// The partial replacement of `traced`, if a stop interrupted retracing.
     underway: Option<Box<Underway<V>>>,
 }
@@ -96,7 +98,7 @@ impl<V: Vertex> Chunk<V> {
     /// A chunk of paths yet to be traced.
     pub fn new(paths: Vec<u32>, groups: u8, histories: HistoryDetail) -> Self {
         let traced = Traced::new(groups, histories == HistoryDetail::Vertices);
-        Self { paths, traced, changed: Past::NOTHING, underway: None }
+        Self { paths, traced, changed: Past::NOTHING, reweighed: false, underway: None }
     }
 
     /// The vertices, path by path.
@@ -124,6 +126,22 @@ impl<V: Vertex> Chunk<V> {
             self.changed.add(changed);
             self.underway = None;
         }
+    }
+
+    /// Records that an edit changed the flux of all vertices.
+    pub fn reweigh(&mut self) {
+        self.reweighed = true;
+    }
+
+    /// Whether vertices are yet to be marked because of their flux.
+    pub fn is_reweighed(&self) -> bool {
+        self.reweighed
+    }
+
+    /// Marks the positions of all vertices, because of their flux.
+    pub fn mark_all(&mut self, marks: &ChangeMarks) {
+        marks.mark_all(self.vertices());
+        self.reweighed = false;
     }
 
     /// Bytes of the paths themselves, and of their interactions.

@@ -3,6 +3,7 @@
 //! retraces the paths that it touched.
 
 mod chunk;
+mod order;
 mod tracer;
 
 pub(crate) use chunk::{Chunk, ChunkBytes};
@@ -18,6 +19,7 @@ use crate::sampling::address::Emitter;
 use crate::scene::Scene;
 use crate::simd::Level;
 use chunk::Update;
+use order::BlockOrder;
 use rayon::prelude::*;
 use siphasher::sip::SipHasher13;
 use std::collections::HashMap;
@@ -31,9 +33,11 @@ pub(crate) struct LightPaths<V> {
     pub light: Option<Light>,
     /// Distinguishes its random numbers from those of other lights.
     pub stream: u32,
+    /// Of the paths that have been ordered, block by block from the first.
     pub chunks: Vec<Chunk<V>>,
-    /// Number of paths started, including those that missed.
-    pub count: u32,
+    plan: Plan,
+    /// The order of the next block.
+    ordering: BlockOrder,
 }
 
 /// What tracing needs besides the scene.
@@ -58,6 +62,7 @@ pub(crate) enum HistoryDetail {
 pub(crate) struct Plan {
     pub count: u32,
     pub seed: u64,
+    /// The refinement pass to which the paths belong; 0 is the base map, which edits keep.
     pub pass: u32,
     /// Groups of values in a history.
     pub groups: u8,
@@ -125,33 +130,53 @@ fn hash_of(name: &str) -> u32 {
 }
 
 impl<V: Vertex> LightPaths<V> {
-    /// Paths yet to be traced. Within each block of paths that are stratified together, they are sorted so that paths
-    /// with similar starts are adjacent.
+    /// Paths yet to be ordered and traced.
     pub fn new(PathSource { light, stream }: PathSource, plan: &Plan) -> Self {
-        let Plan { count, seed, pass, groups, histories } = *plan;
-        const BLOCK: u32 = LightPathSampler::STRATIFIED;
-        let numbers = PathNumbers { seed, pass, stream };
-        let of_block = |block: u32| {
-            let key = |path: u32| morton(numbers.of(path).emission());
-            let last = (block + 1).saturating_mul(BLOCK).min(count);
-            let mut keys: Vec<(u32, u32)> = (block * BLOCK..last).map(|path| (key(path), path)).collect();
-            keys.sort_unstable();
-            let chunks = keys.chunks(chunk::PATHS);
-            let chunks =
-                chunks.map(|keys| Chunk::new(keys.iter().map(|key| key.1).collect(), groups, histories));
-            chunks.collect::<Vec<_>>()
-        };
-        let chunks = (0..count.div_ceil(BLOCK)).into_par_iter().flat_map_iter(of_block).collect();
-        Self { light, stream, chunks, count }
+        Self { light, stream, chunks: Vec::new(), plan: *plan, ordering: BlockOrder::default() }
     }
 
-    /// Changes the number of paths; whole blocks that exist both before and after are kept.
-    pub fn set_count(&mut self, plan: &Plan) {
-        let other = Self::new(PathSource { light: self.light.take(), stream: self.stream }, plan);
-        let whole = (self.count.min(plan.count) / LightPathSampler::STRATIFIED) as usize;
-        let chunks = whole * (LightPathSampler::STRATIFIED as usize).div_ceil(chunk::PATHS);
-        let old = std::mem::replace(self, other);
-        self.chunks.iter_mut().zip(old.chunks).take(chunks).for_each(|(new, old)| *new = old);
+    /// Number of paths started, including those that missed.
+    pub fn count(&self) -> u32 {
+        self.plan.count
+    }
+
+    /// Whether all paths are in chunks, and are up to date with the scene.
+    pub fn is_valid(&self) -> bool {
+        self.is_ordered() && self.chunks.iter().all(Chunk::is_valid)
+    }
+
+    fn is_ordered(&self) -> bool {
+        self.chunks.len() == (self.plan.count as usize).div_ceil(chunk::PATHS)
+    }
+
+    /// Changes the number of paths. Of the paths so far, whole blocks that exist both before and after are kept; returns the
+    /// others.
+    pub fn set_count(&mut self, count: u32) -> Vec<Chunk<V>> {
+        let blocks = (self.plan.count.min(count) / order::BLOCK) as usize;
+        let kept = blocks * (order::BLOCK as usize).div_ceil(chunk::PATHS);
+        self.plan.count = count;
+        self.ordering = BlockOrder::default();
+        self.chunks.split_off(kept.min(self.chunks.len()))
+    }
+
+    /// Distributes the paths over chunks, block by block, so that those with similar starts are traced together. False if stopped
+    /// first.
+    fn order(&mut self, limits: &Limits) -> bool {
+        let numbers = self.numbers();
+        let Plan { count, groups, histories, .. } = self.plan;
+        while !self.is_ordered() {
+            let first = cast::fit_u32(self.chunks.len() * chunk::PATHS);
+            let block = first..first.saturating_add(order::BLOCK).min(count);
+            let Some(paths) = self.ordering.go_on(block, &numbers, limits) else { return false };
+            let chunks = paths.chunks(chunk::PATHS);
+            self.chunks.extend(chunks.map(|paths| Chunk::new(paths.to_vec(), groups, histories)));
+        }
+        true
+    }
+
+    fn numbers(&self) -> PathNumbers {
+        let Plan { seed, pass, .. } = self.plan;
+        PathNumbers { seed, pass, stream: self.stream }
     }
 
     /// The factor for the flux of its photons.
@@ -169,8 +194,6 @@ impl<V: Vertex> LightPaths<V> {
 pub(crate) struct Tracing<'a> {
     pub scene: &'a Scene,
     pub ground: &'a Ground,
-    /// The refinement pass to which the paths belong; 0 is the base map, which edits keep.
-    pub pass: u32,
     /// Marks for the positions where vertices change.
     pub marks: &'a ChangeMarks,
     pub limits: &'a Limits<'a>,
@@ -186,14 +209,17 @@ pub(crate) struct TracingProgress {
 }
 
 impl Tracing<'_> {
-    /// Traces the invalid paths.
+    /// Orders the paths that are not in chunks yet, then traces the invalid ones.
     pub fn trace<V: Vertex>(&self, lights: &mut [LightPaths<V>]) -> TracingProgress {
-        let Self { scene, ground: Ground { reading, enclosure, level }, pass, marks, limits } = *self;
-        let seed = scene.render.seed;
+        let Self { scene, ground: Ground { reading, enclosure, level }, marks, limits } = *self;
+        if !lights.iter_mut().all(|light| light.order(limits)) {
+            return TracingProgress { traced: 0, finished: false };
+        }
         let mut work: Vec<(&mut Chunk<V>, EmissionSource, PathNumbers)> = Vec::new();
-        for LightPaths { light, stream, chunks, .. } in lights {
+        for paths in lights {
+            let numbers = paths.numbers();
+            let LightPaths { light, chunks, .. } = paths;
             if let Some(source) = LightPaths::<V>::source(light.as_ref(), scene) {
-                let numbers = PathNumbers { seed, pass, stream: *stream };
                 let invalid = chunks.iter_mut().filter(|chunk| !chunk.is_valid());
                 work.extend(invalid.map(|chunk| (chunk, source, numbers)));
             }
@@ -212,16 +238,6 @@ impl Tracing<'_> {
         });
         TracingProgress { traced: traced.into_inner(), finished: unfinished.into_inner() == 0 }
     }
-}
-
-/// The Morton code of four numbers in [0, 1): similar numbers have similar codes.
-fn morton(u: [f32; 4]) -> u32 {
-    let steps = u.map(|u| cast::low_u32(cast::index(u * 256.0) as u64));
-    let bit = |i: u32| {
-        let of = |k: usize| (steps[k] >> i & 1) << (3 - k);
-        of(0) | of(1) | of(2) | of(3)
-    };
-    (0..8).rev().fold(0, |key, i| key << 4 | bit(i))
 }
 
 #[cfg(test)]

@@ -13,7 +13,8 @@ mod tracer;
 pub use settings::Settings;
 
 use super::{
-    Edited, ItemChanges, KeptCount, KeptItems, Method, MethodReport, MovedKey, PixelCounts, Resources, Stop,
+    Edited, ItemChanges, KeptCount, KeptItems, Limits, Method, MethodReport, MovedKey, PixelCounts,
+    Resources, Stop, Updated,
 };
 use crate::film::{Goal, PixelSample, Tile};
 use crate::math::Ray;
@@ -74,13 +75,24 @@ impl Method for PathTracer {
         difference.view() || difference.light() || difference.majorants || difference.seed
     }
 
-    fn update(&mut self, edit: &Edited, tiles: &mut [TileState]) -> bool {
-        let Some(query) = self.keeper.as_mut().and_then(|keeper| keeper.update(edit)) else { return false };
+    fn update(&mut self, edit: &Edited, tiles: &mut [TileState], limits: &Limits) -> Updated {
+        let Some(keeper) = self.keeper.as_mut().filter(|_| SampleKeeper::survives(edit.difference)) else {
+            return Updated::StartAnew;
+        };
+        let Some(query) = keeper.update(edit, limits) else { return Updated::Stopped };
         tiles.par_iter_mut().for_each(|tile| {
             tile.pending = None;
             tile.samples.ask(query);
         });
-        true
+        Updated::Done
+    }
+
+    fn is_settling(&self, _: &Scene) -> bool {
+        self.keeper.as_ref().is_some_and(|keeper| !keeper.reading.is_complete())
+    }
+
+    fn prepare(&mut self, _: &Scene, _: u32, limits: &Limits) -> bool {
+        self.keeper.as_mut().is_none_or(|keeper| keeper.reading.complete(limits))
     }
 
     fn count_anew(&mut self, tiles: &mut [TileState]) {

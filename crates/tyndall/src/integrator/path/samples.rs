@@ -3,7 +3,7 @@
 
 use crate::film::{PixelSample, Tile};
 use crate::integrator::history::{PackedHistories, Past, Reading, Touched};
-use crate::integrator::{Edited, ItemChanges};
+use crate::integrator::{Edited, ItemChanges, Limits};
 use crate::math::Rgb;
 use crate::scene::{Background, Difference, Scene};
 use crate::transfer::Grouping;
@@ -42,19 +42,20 @@ impl SampleKeeper {
         next < self.most * tile.pixel_count() && next <= kept.samples.len()
     }
 
-    /// The query for the kept samples after an edit; `None` if all must be retaken.
-    pub fn update(&mut self, edit: &Edited) -> Option<SampleQuery> {
-        let Edited { old, new, difference } = *edit;
+    /// Whether any samples may survive an edit.
+    pub fn survives(difference: &Difference) -> bool {
         let Difference { volume, majorants, clip, seed, camera, size, .. } = *difference;
-        if volume || majorants || clip || seed || camera || size {
-            return None;
-        }
+        !(volume || majorants || clip || seed || camera || size)
+    }
+
+    /// The query for the kept samples after an edit that they may survive; `None` if stopped first, see [`Reading::update`].
+    pub fn update(&mut self, edit: &Edited, limits: &Limits) -> Option<SampleQuery> {
+        let Edited { old, new, difference } = *edit;
+        let media = [&*old.medium, &*new.medium];
+        let moved = self.reading.update(media, &difference.transfer.opacity, limits)?;
         let touched = Touched::new(&self.reading.groups, old, new, difference);
         let mut past = touched.paths;
-        if !difference.transfer.opacity.is_empty() {
-            let [sunk, raised] = self.reading.update(&old.medium, &new.medium);
-            past.flight |= sunk | raised;
-        }
+        past.flight |= moved.sunk | moved.raised;
         let lights = !difference.lights.is_empty();
         if lights || touched.glow {
             // Every scattering samples one light, chosen among all by power.
@@ -213,7 +214,6 @@ impl SampleTile {
             *before = PendingQuery { end: last.end, query: before.query.with(last.query) };
         }
         (self.pending, self.looked_up) = (pending, 0);
-        self.counts = SampleCounts::default();
     }
 
     /// Differences to the samples at another time.

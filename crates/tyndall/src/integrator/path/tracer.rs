@@ -61,6 +61,10 @@ impl Kernel for TracePixels<'_> {
                 kept.put(number, &path.seen, &path.past, tile.pixel_count());
             }
             tile.add(&path.seen);
+            // A path that leaves the medium without scattering asks nowhere else.
+            if stop.reached() {
+                return;
+            }
         }
     }
 }

@@ -2,28 +2,37 @@
 
 use super::stored::Photon;
 use super::{PhotonMapper, SegmentTile, marks_for, plan, step};
-use crate::integrator::Edited;
-use crate::integrator::history::Touched;
-use crate::integrator::light_paths::{LightPaths, PathSource, sources};
+use crate::integrator::cells::ChangeMarks;
+use crate::integrator::history::{Moved, Touched};
+use crate::integrator::light_paths::{Chunk, LightPaths, PathSource, sources};
+use crate::integrator::{Edited, Limits, Updated, drop_elsewhere};
 use crate::light::Light;
 use crate::scene::Scene;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 impl PhotonMapper {
-    /// Drops the paths, photons and segments that an edit touched, and nothing else; false if everything must be
-    /// recomputed.
-    pub(super) fn keep_valid(&mut self, edit: &Edited, tiles: &mut [Option<SegmentTile>]) -> bool {
+    /// Drops the paths, photons and segments that an edit touched, and nothing else.
+    pub(super) fn keep_valid(
+        &mut self,
+        edit: &Edited,
+        tiles: &mut [Option<SegmentTile>],
+        limits: &Limits,
+    ) -> Updated {
         let Edited { old, new, difference } = *edit;
         if difference.volume || difference.majorants || difference.clip || difference.seed {
-            return false;
+            return Updated::StartAnew;
         }
+        // Light paths do not read a cell's smallest opacity.
+        let (media, reading) = ([&*old.medium, &*new.medium], &mut self.ground.reading);
+        let Some(Moved { raised, .. }) = reading.update(media, &difference.transfer.opacity, limits) else {
+            return Updated::Stopped;
+        };
         let mut touched = Touched::new(&self.ground.reading.groups, old, new, difference);
-        if !difference.transfer.opacity.is_empty() {
-            // Light paths do not read a cell's smallest opacity.
-            let [_, raised] = self.ground.reading.update(&old.medium, &new.medium);
-            touched.paths.flight |= raised;
+        touched.paths.flight |= raised;
+        if let Some(pass) = self.pass.take() {
+            drop_elsewhere(pass);
         }
-        self.traced = 0;
-        self.pass = None;
         // With a different step, segments end at other positions, and the widest slice of a beam changes.
         let steps = step(old, &self.settings) != step(new, &self.settings);
         if steps {
@@ -41,13 +50,14 @@ impl PhotonMapper {
         if difference.camera || difference.size || steps {
             self.has_segments = false;
         }
-        for tile in tiles {
-            match tile {
-                Some(tile) if self.has_segments => tile.add_change(touched.view),
-                tile => *tile = None,
+        for tile in tiles.iter_mut().flatten() {
+            if self.has_segments {
+                tile.add_change(touched.view);
+            } else {
+                tile.forget();
             }
         }
-        true
+        Updated::Done
     }
 
     /// Keeps the paths of lights whose paths are unchanged, even if their index changed.
@@ -67,11 +77,11 @@ impl PhotonMapper {
                 Some(kept) if same(&kept) => (Some(kept), None),
                 kept => (None, kept),
             };
-            gone.iter().for_each(|gone| self.mark(gone));
+            self.gone.extend(gone.into_iter().flat_map(gone_chunks));
             let mut paths = match kept {
                 Some(mut kept) => {
                     if kept.light.as_ref().map(Light::color) != light.as_ref().map(Light::color) {
-                        self.mark(&kept);
+                        kept.chunks.iter_mut().for_each(Chunk::reweigh);
                         self.map.discard();
                     }
                     kept.light = light;
@@ -82,22 +92,45 @@ impl PhotonMapper {
                     LightPaths::new(PathSource { light, stream }, &plan)
                 }
             };
-            if paths.count != plan.count {
+            if paths.count() != plan.count {
                 // Every photon of this light now carries more or less flux.
-                self.mark(&paths);
+                paths.chunks.iter_mut().for_each(Chunk::reweigh);
                 self.map.discard();
-                paths.set_count(&plan);
+                self.gone.extend(paths.set_count(plan.count));
             }
             self.lights.push(paths);
         }
         for gone in old.into_iter().flatten() {
-            self.mark(&gone);
+            self.gone.extend(gone_chunks(gone));
             self.map.discard();
         }
     }
 
-    /// Marks the positions of all photons of a light.
-    fn mark(&self, light: &LightPaths<Photon>) {
-        light.chunks.iter().for_each(|chunk| self.marks.mark_all(chunk.vertices()));
+    /// Marks the positions of photons whose flux an edit changed or that are gone, in parallel on the current pool; false if stopped
+    /// first.
+    pub(super) fn mark_reweighed(&mut self, limits: &Limits) -> bool {
+        let Self { gone, lights, marks, has_segments, .. } = self;
+        let kept = lights.iter_mut().flat_map(|light| &mut light.chunks);
+        let reweighed: Vec<_> = gone.iter_mut().chain(kept).filter(|chunk| chunk.is_reweighed()).collect();
+        let left = AtomicUsize::new(reweighed.len());
+        let off = ChangeMarks::off();
+        let marks = if *has_segments { &*marks } else { &off };
+        reweighed.into_par_iter().with_max_len(1).for_each(|chunk| {
+            if !limits.stop().reached() {
+                chunk.mark_all(marks);
+                left.fetch_sub(1, Ordering::Relaxed);
+            }
+        });
+        let done = left.into_inner() == 0;
+        if done && !gone.is_empty() {
+            drop_elsewhere(std::mem::take(gone));
+        }
+        done
     }
+}
+
+/// The chunks of a light that is gone, to be marked.
+fn gone_chunks(mut light: LightPaths<Photon>) -> Vec<Chunk<Photon>> {
+    light.chunks.iter_mut().for_each(Chunk::reweigh);
+    light.chunks
 }

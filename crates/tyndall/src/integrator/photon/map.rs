@@ -3,9 +3,11 @@
 use super::kernel::Points;
 use super::settings::Estimator;
 use super::stored::Photon;
-use crate::integrator::Limits;
-use crate::integrator::cells::{CellGrid, CellSort, CellStarts, KEY_BYTES, Positioned, SortedItems};
+use crate::integrator::cells::{
+    CellGrid, CellSort, CellStarts, KEY_BYTES, Positioned, SortedAddresses, SortedItems,
+};
 use crate::integrator::light_paths::Chunk;
+use crate::integrator::{Limits, drop_elsewhere};
 use crate::math::{DVec3, Vec3, cast};
 use crate::medium::Medium;
 use rayon::prelude::*;
@@ -62,10 +64,10 @@ pub(super) struct MapInProgress {
     filling: Option<Filling>,
 }
 
-/// Sorted photons, and the map into which some pieces of them have been written.
+/// Addresses of sorted photons, and the map into which some pieces of them have been written.
 #[derive(Debug)]
 struct Filling {
-    sorted: SortedItems,
+    items: SortedAddresses,
     map: PhotonMap,
     filled: Vec<bool>,
 }
@@ -90,7 +92,14 @@ impl MapState {
 
     /// Discards the map, because photons change.
     pub fn discard(&mut self) {
-        *self = Self::Absent;
+        self.become_state(Self::Absent);
+    }
+
+    fn become_state(&mut self, state: Self) {
+        match std::mem::replace(self, state) {
+            Self::Absent => {}
+            old => drop_elsewhere(old),
+        }
     }
 
     /// Builds the map, or continues to; false if stopped first. See [`MapInProgress::go_on`].
@@ -107,7 +116,7 @@ impl MapState {
         if let Self::InProgress(map) = self
             && let Some(map) = map.go_on(medium, settings, lights, limits)
         {
-            *self = Self::Ready(map);
+            self.become_state(Self::Ready(map));
         }
         self.ready().is_some()
     }
@@ -135,28 +144,30 @@ impl MapInProgress {
         if self.filling.is_none() {
             let lists: Vec<&[Photon]> = chunks.iter().map(|chunk| chunk.0).collect();
             self.filling = self.sort.go_on(&settings.grid, &lists, limits).map(|sorted| {
-                let map = PhotonMap::with_room(settings, &sorted);
-                let filled = vec![false; sorted.len().div_ceil(PIECE)];
-                Filling { sorted, map, filled }
+                let SortedItems { items, starts } = sorted;
+                let map = PhotonMap::with_room(settings, starts, items.len());
+                let filled = vec![false; items.len().div_ceil(PIECE)];
+                Filling { items, map, filled }
             });
         }
-        let Filling { sorted, map, filled } = self.filling.as_mut()?;
-        map.fill(medium, sorted, &chunks, filled, limits);
+        let Filling { items, map, filled } = self.filling.as_mut()?;
+        map.fill(medium, items, &chunks, filled, limits);
         if filled.iter().all(|&filled| filled) { self.filling.take().map(|done| done.map) } else { None }
     }
 }
 
 impl PhotonMap {
-    /// A map with room for the sorted photons, and for a whole vector after the last.
-    fn with_room(&MapSettings { grid, radius, estimate }: &MapSettings, sorted: &SortedItems) -> Self {
-        let room = sorted.len() + crate::simd::MOST_LANES;
+    /// A map with room for photons in these cells, and for a whole vector after the last.
+    fn with_room(settings: &MapSettings, starts: CellStarts, photons: usize) -> Self {
+        let MapSettings { grid, radius, estimate } = *settings;
+        let room = photons + crate::simd::MOST_LANES;
         let zeros = || vec![0.0; room];
         Self {
             radius,
             points: Points::new(),
             estimate,
             grid,
-            starts: sorted.starts.clone(),
+            starts,
             x: zeros(),
             y: zeros(),
             z: zeros(),
@@ -172,7 +183,7 @@ impl PhotonMap {
     fn fill(
         &mut self,
         medium: &Medium,
-        sorted: &SortedItems,
+        items: &SortedAddresses,
         chunks: &[(&[Photon], DVec3)],
         filled: &mut [bool],
         limits: &Limits,
@@ -200,8 +211,8 @@ impl PhotonMap {
                     return;
                 }
                 let first = piece * PIECE;
-                for i in 0..PIECE.min(sorted.len() - first) {
-                    let address = sorted.address(first + i);
+                for i in 0..PIECE.min(items.len() - first) {
+                    let address = items.address(first + i);
                     let (photons, scale) = chunks[address.list];
                     let photon = photons[address.index];
                     [x[i], y[i], z[i]] = grid.to_metric(photon.position()).to_array();

@@ -24,10 +24,12 @@ pub use settings::{Estimate, Histories, HistoryBins, Settings, SpatialHistory};
 
 use super::cells::{CellGrid, ChangeMarks};
 use super::history::Reading;
-use super::light_paths::{ChunkBytes, Ground, HistoryDetail, LightPaths, Plan, Tracing, most_kept, sources};
+use super::light_paths::{
+    Chunk, ChunkBytes, Ground, HistoryDetail, LightPaths, Plan, Tracing, most_kept, sources,
+};
 use super::{
     Edited, ItemChanges, KeptCount, KeptItems, Limits, MemoryNeed, Method, MethodReport, NamedCount,
-    PixelCounts, Resources, SettingProblem, StageNames, Stop, WorkShare,
+    PixelCounts, Resources, SettingProblem, StageNames, Stop, Updated, WorkShare, drop_elsewhere,
 };
 use crate::film::{Goal, Tile};
 use crate::light::Enclosure;
@@ -48,6 +50,8 @@ pub struct PhotonMapper {
     settings: Settings,
     ground: Ground,
     lights: Vec<LightPaths<Photon>>,
+    /// Paths of the base map that are gone, with photons whose positions are yet to be marked.
+    gone: Vec<Chunk<Photon>>,
     /// The base map.
     map: MapState,
     /// Where photons have changed since segments were last invalidated.
@@ -79,7 +83,7 @@ impl PhotonMapper {
 
     /// Number of light paths.
     fn paths(&self) -> usize {
-        self.lights.iter().map(|light| light.count as usize).sum()
+        self.lights.iter().map(|light| light.count() as usize).sum()
     }
 
     /// What is kept for future edits besides segments.
@@ -159,6 +163,7 @@ impl Method for PhotonMapper {
             settings: *settings,
             ground: Ground { reading, enclosure, level: resources.level },
             lights,
+            gone: Vec::new(),
             map: MapState::Absent,
             marks: marks_for(scene, settings),
             has_segments: false,
@@ -173,8 +178,13 @@ impl Method for PhotonMapper {
         difference.view() || difference.light() || numbers
     }
 
-    fn update(&mut self, edit: &Edited, tiles: &mut [Option<SegmentTile>]) -> bool {
-        self.keep_valid(edit, tiles)
+    fn update(&mut self, edit: &Edited, tiles: &mut [Option<SegmentTile>], limits: &Limits) -> Updated {
+        self.keep_valid(edit, tiles, limits)
+    }
+
+    fn is_settling(&self, scene: &Scene) -> bool {
+        let is_lit = || self.map.ready().is_some() && self.lights.iter().all(LightPaths::is_valid);
+        !self.ground.reading.is_complete() || (scene.render.max_scatter > 0 && !is_lit())
     }
 
     fn count_anew(&mut self, tiles: &mut [Option<SegmentTile>]) {
@@ -184,18 +194,25 @@ impl Method for PhotonMapper {
 
     /// Prepares the photons for a sample; the first sample uses the base map. False if stopped first.
     fn prepare(&mut self, scene: &Scene, sample: u32, limits: &Limits) -> bool {
+        if !self.ground.reading.complete(limits) {
+            return false;
+        }
         if scene.render.max_scatter == 0 {
             return true;
         }
         if sample > 0 {
             if self.pass.as_ref().is_none_or(|pass| pass.number != sample) {
-                self.pass = Some(Pass::new(scene, &self.settings, sample));
+                let old = self.pass.replace(Pass::new(scene, &self.settings, sample));
+                drop_elsewhere(old);
             }
             return self.pass.as_mut().is_some_and(|pass| pass.prepare(scene, &self.ground, limits));
         }
+        if !self.mark_reweighed(limits) {
+            return false;
+        }
         let off = ChangeMarks::off();
         let marks = if self.has_segments { &self.marks } else { &off };
-        let tracing = Tracing { scene, ground: &self.ground, pass: 0, marks, limits };
+        let tracing = Tracing { scene, ground: &self.ground, marks, limits };
         let done = tracing.trace(&mut self.lights);
         self.traced += done.traced;
         if done.traced > 0 {
@@ -232,6 +249,7 @@ impl Method for PhotonMapper {
         let per_ray = self.settings.segments as usize;
         let segments =
             segments.get_or_insert_with(|| SegmentTile::new(tile.pixel_count(), per_ray, groups.count()));
+        segments.make_room(tile.pixel_count());
         let view = View { scene, map: self.map.ready(), step, gather_spacing };
         let positions = &self.marks;
         level.run(GatherSegments { view, segments, tile, goal, groups, cells, positions, stop });
@@ -368,7 +386,7 @@ fn build_map(
     let per_volume = f64::from(settings.radius).powi(3).recip() / f64::from(scene.medium.density());
     let scale = |light: &LightPaths<Photon>| {
         let [r, g, b] = light.color().to_array().map(f64::from);
-        DVec3::new(r, g, b) * (per_volume / f64::from(light.count))
+        DVec3::new(r, g, b) * (per_volume / f64::from(light.count()))
     };
     let lit: Vec<Lit> =
         lights.iter().map(|light| Lit { chunks: &light.chunks, scale: scale(light) }).collect();

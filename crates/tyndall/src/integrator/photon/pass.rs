@@ -8,7 +8,7 @@ use super::{build_map, plan};
 use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::cells::ChangeMarks;
 use crate::integrator::light_paths::{Ground, HistoryDetail, LightPaths, Plan, Tracing, sources};
-use crate::integrator::{Limits, Stop};
+use crate::integrator::{Limits, Stop, drop_elsewhere};
 use crate::sampling::address::Purpose;
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes};
@@ -55,11 +55,11 @@ impl Pass {
             return true;
         }
         let marks = ChangeMarks::off();
-        let tracing = Tracing { scene, ground, pass: self.number, marks: &marks, limits };
+        let tracing = Tracing { scene, ground, marks: &marks, limits };
         let built = tracing.trace(&mut self.lights).finished
             && build_map(&mut self.map, scene, self.radius, &self.settings, &self.lights, limits);
         if built {
-            self.lights = Vec::new();
+            drop_elsewhere(std::mem::take(&mut self.lights));
         }
         built
     }

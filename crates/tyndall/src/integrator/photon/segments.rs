@@ -21,8 +21,12 @@ pub struct SegmentTile {
     segments: Vec<Segment>,
     /// Values that each segment read.
     histories: PackedHistories,
+    /// Whether none is known, whatever they hold; their memory will be reused.
+    forgotten: bool,
     /// Values that have changed since the segments were last invalidated; `None` without an edit.
     changed: Option<Historygram>,
+    /// Number of pixels whose segments have been asked where photons changed, if a stop interrupted that.
+    asked: usize,
     pub(super) computed: SegmentCounts,
 }
 
@@ -91,14 +95,32 @@ impl SegmentTile {
             per_ray,
             segments: vec![Segment::UNKNOWN; count],
             histories: PackedHistories::with_len(groups, count),
+            forgotten: false,
             changed: None,
+            asked: 0,
             computed: SegmentCounts::default(),
         }
     }
 
-    /// Number of segments.
+    /// Forgets all segments.
+    pub fn forget(&mut self) {
+        self.forgotten = true;
+        self.changed = None;
+    }
+
+    /// Makes room for this many pixels if the segments were forgotten.
+    pub fn make_room(&mut self, pixels: usize) {
+        if std::mem::take(&mut self.forgotten) {
+            let count = pixels * self.per_ray;
+            self.segments.clear();
+            self.segments.resize(count, Segment::UNKNOWN);
+            self.histories.resize(count);
+        }
+    }
+
+    /// Number of segments that are not forgotten.
     pub fn len(&self) -> usize {
-        self.segments.len()
+        if self.forgotten { 0 } else { self.segments.len() }
     }
 
     /// Size in bytes.
@@ -109,7 +131,7 @@ impl SegmentTile {
     /// Differences between its known segments and those known at another time; all are new if the number of segments
     /// differs.
     pub fn compare(&self, other: &Self) -> ItemChanges {
-        if self.len() != other.len() {
+        if self.forgotten || self.len() != other.len() {
             return ItemChanges { differing: 0, new: self.len() };
         }
         let mut changes = ItemChanges::default();
@@ -128,7 +150,7 @@ impl SegmentTile {
     /// Records which values an edit changed; photons may have changed anywhere.
     pub fn add_change(&mut self, values: Historygram) {
         self.changed = Some(self.changed.unwrap_or_default() | values);
-        self.computed = SegmentCounts::default();
+        self.asked = 0;
     }
 
     /// Whether all recorded changes have been applied.
@@ -136,9 +158,9 @@ impl SegmentTile {
         self.changed.is_none()
     }
 
-    /// Invalidates the segments that the recorded changes touch.
-    fn invalidate(&mut self, view: &View, tile: &Tile, positions: &ChangeMarks) {
-        let Some(changed) = self.changed.take() else { return };
+    /// Invalidates the segments that the recorded changes touch; false if stopped first.
+    fn invalidate(&mut self, view: &View, tile: &Tile, positions: &ChangeMarks, stop: &Stop) -> bool {
+        let Some(changed) = self.changed else { return true };
         if !changed.is_empty() {
             for i in 0..self.len() {
                 if self.histories.get(i).meets(changed) {
@@ -149,13 +171,20 @@ impl SegmentTile {
         if positions.everywhere() {
             self.segments.fill(Segment::UNKNOWN);
         } else if positions.any() {
-            let pixels = tile.positions(0..tile.pixel_count());
-            for (pixel, segments) in pixels.zip(self.segments.chunks_exact_mut(self.per_ray)) {
+            let pixels = tile.positions(self.asked..tile.pixel_count());
+            let segments = &mut self.segments[self.asked * self.per_ray..];
+            for (pixel, segments) in pixels.zip(segments.chunks_exact_mut(self.per_ray)) {
                 if segments.iter().any(Segment::is_known) {
                     forget_near(view, pixel, positions, segments);
                 }
+                self.asked += 1;
+                if stop.reached() {
+                    return false;
+                }
             }
         }
+        self.changed = None;
+        true
     }
 
     /// The first segment of a ray that is visible but not known; `None` if there is none.
@@ -275,7 +304,9 @@ impl Kernel for GatherSegments<'_> {
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
         let Self { view, segments, tile, goal, groups, cells, positions, stop } = self;
-        segments.invalidate(&view, tile, positions);
+        if !segments.invalidate(&view, tile, positions, stop) {
+            return;
+        }
         let turn = tile.turn(goal);
         let pixels: Vec<[u32; 2]> = tile.positions(turn.clone()).collect();
         let rays: Vec<(Ray, Track)> = pixels.iter().map(|&pixel| ray_of(view.scene, pixel)).collect();

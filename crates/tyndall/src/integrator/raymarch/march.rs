@@ -6,7 +6,6 @@ use crate::integrator::Stop;
 use crate::integrator::view_march::{Coverage, OPAQUE, Shader, composite};
 use crate::math::{Ray, Rgb, Vec3};
 use crate::medium::{PacketMarch, PacketSample, Track};
-use crate::scattering::Event;
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes, Level, MOST_LANES};
 use fearless_simd::prelude::*;
@@ -59,7 +58,7 @@ impl RayMarch {
         scene.camera.ray(scene.size, film, [(u + turn_x).fract(), (v + turn_y).fract()])
     }
 
-    /// Marches a packet to its end, or until a stop, but for at least one shaded position; returns whether it has
+    /// Marches a packet to its end, or until a stop, but for at least one shadow ray or position; returns whether it has
     /// ended.
     #[inline(always)]
     fn go_on<S: Lanes>(&self, simd: S, scene: &Scene, packet: &mut Packet, stop: &Stop) -> bool {
@@ -75,36 +74,61 @@ impl RayMarch {
         stopped.is_none()
     }
 
-    /// Radiance that a position adds in direction `w_out`, per unit extinction.
+    /// Radiance that a position adds in direction `w_out`, per unit extinction. `None` if stopped first, after at least one shadow ray:
+    /// the light so far is in `lit`, from which the next call goes on.
     #[inline(always)]
-    fn source<S: Lanes>(&self, simd: S, scene: &Scene, position: Vec3, value: f32, w_out: Vec3) -> Rgb {
+    fn source<S: Lanes>(
+        &self,
+        simd: S,
+        scene: &Scene,
+        at: &ShadedPosition,
+        lit: &mut LitSoFar,
+        stop: &Stop,
+    ) -> Option<Rgb> {
         let medium = &*scene.medium;
-        let optics = medium.transfer().optics(value);
-        let here = medium.volume().grid().index_to_world(position);
-        optics.emitted() + self.direct(simd, scene, &medium.event(position, &optics), here, w_out)
-    }
-
-    /// Light from all lights that a position scatters in direction `w_out`, per unit extinction.
-    #[inline(always)]
-    fn direct<S: Lanes>(&self, simd: S, scene: &Scene, event: &Event, here: Vec3, w_out: Vec3) -> Rgb {
-        let medium = &*scene.medium;
-        let mut sum = Rgb::BLACK;
-        for light in scene.lights.lights() {
+        let optics = medium.transfer().optics(at.value);
+        let event = medium.event(at.position, &optics);
+        let here = medium.volume().grid().index_to_world(at.position);
+        let lights = scene.lights.lights();
+        while let Some(light) = lights.get(lit.light) {
             let points = if light.can_be_passed() { &self.light_points[..] } else { &[[0.5; 2]] };
             let share = 1.0 / points.len() as f32;
-            for &u in points {
+            while let Some(&u) = points.get(lit.point) {
+                lit.point += 1;
                 let Some(sample) = light.sample(here, u) else { continue };
-                let unshadowed = event.eval(w_out, sample.direction) * sample.radiance * share;
+                let unshadowed = event.eval(at.w_out, sample.direction) * sample.radiance * share;
                 if unshadowed.is_black() {
                     continue;
                 }
                 let track = medium.track(&Ray::new(here, sample.direction), sample.distance);
                 let thickness = medium.thickness_lanes(simd, &track, self.step, -OPAQUE.ln());
-                sum += unshadowed * (-thickness).exp();
+                lit.sum += unshadowed * (-thickness).exp();
+                if stop.reached() {
+                    return None;
+                }
             }
+            (lit.light, lit.point) = (lit.light + 1, 0);
         }
-        sum
+        Some(optics.emitted() + std::mem::take(lit).sum)
     }
+}
+
+/// A position to be shaded.
+struct ShadedPosition {
+    /// In index space.
+    position: Vec3,
+    /// Data value.
+    value: f32,
+    w_out: Vec3,
+}
+
+/// Light that has been found at a position, if a stop interrupted shading it.
+#[derive(Clone, Copy, Debug, Default)]
+struct LitSoFar {
+    sum: Rgb,
+    /// The next light, and the next point on it.
+    light: usize,
+    point: usize,
 }
 
 /// Adds emission and singly scattered light to a packet's rays.
@@ -135,8 +159,12 @@ impl<S: Lanes> Shader<S, ()> for DirectShader<'_> {
                 }
                 let [x, y, z] = sample.position;
                 let position = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
-                let w_out = -packet.rays[lane].direction;
-                let source = raymarch.source(simd, scene, position, sample.value.as_slice()[lane], w_out);
+                let value = sample.value.as_slice()[lane];
+                let at = ShadedPosition { position, value, w_out: -packet.rays[lane].direction };
+                let Some(source) = raymarch.source(simd, scene, &at, &mut packet.lit, stop) else {
+                    packet.shaded = lane;
+                    return false;
+                };
                 packet.radiance[lane] += source * covered;
                 *moved = true;
             }
@@ -166,6 +194,8 @@ pub struct Packet {
     k: [i32; MOST_LANES],
     /// Number of lanes whose position at that step has already been shaded.
     shaded: usize,
+    /// What has been found at the next of them.
+    lit: LitSoFar,
     radiance: [Rgb; MOST_LANES],
     alpha: [f32; MOST_LANES],
     /// Sum of the sample distances inside the medium, weighted by what each sample adds to `alpha`.
@@ -180,6 +210,7 @@ impl Packet {
             tracks: [Track::default(); MOST_LANES],
             k: [0; MOST_LANES],
             shaded: 0,
+            lit: LitSoFar::default(),
             radiance: [Rgb::BLACK; MOST_LANES],
             alpha: [0.0; MOST_LANES],
             depth: [0.0; MOST_LANES],
