@@ -81,7 +81,7 @@ fn differing(path: &str, one: &Value, other: &Value) -> Option<KeyDifference> {
         _ => None,
     };
     let shown = |value: &Value| {
-        if value.is_null() { "nothing".to_owned() } else { excerpt(&value.to_string()).into() }
+        if value.is_null() { "nothing".to_owned() } else { excerpt(&value.to_string()) }
     };
     deeper.or_else(|| Some(KeyDifference { path: path.to_owned(), values: [shown(one), shown(other)] }))
 }

@@ -202,17 +202,18 @@ impl Film {
         goals.into_iter().find(|&goal| !self.has_reached(goal))
     }
 
-    /// Number of tiles, from the first, that can come as far as a goal with at most this many samples of all their pixels; at least one that
-    /// has not come so far is among them.
-    pub(crate) fn tiles_within(&self, goal: Goal, most: u64) -> usize {
+    /// Number of tiles, from the first, that come as far as a goal with at most this many samples of all their pixels, or at least with
+    /// those of one tile; `None` if that is more than `most` and `exceeds` does not allow it.
+    pub(crate) fn tiles_within(&self, goal: Goal, most: u64, exceeds: bool) -> Option<usize> {
         let mut all = 0;
-        let exceeds = |tile: &Tile| {
+        for (i, tile) in self.tiles.iter().enumerate() {
             let due = tile.taken_at(goal).saturating_sub(tile.taken()) as u64;
-            let is_first = all == 0;
+            if all + due > most && (all > 0 || !exceeds) {
+                return (all > 0).then_some(i);
+            }
             all += due;
-            all > most && !is_first
-        };
-        self.tiles.iter().position(exceeds).unwrap_or(self.tiles.len())
+        }
+        Some(self.tiles.len())
     }
 
     /// Fraction of the pixels that have a sample.

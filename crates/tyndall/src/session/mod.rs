@@ -249,7 +249,8 @@ impl Session {
             return self.progress();
         }
         let Self { scene, engine, film, threads, spent, .. } = self;
-        let end = budget.pixel_samples.map(|most| film.pixel_samples().saturating_add(most));
+        let (begin, mut exceeds) = (film.pixel_samples(), true);
+        let end = budget.pixel_samples.map(|most| begin.saturating_add(most));
         while !film.has_reached(budget.goal()) && !limits.stop().reached() {
             let left = end.map(|end| end.saturating_sub(film.pixel_samples()));
             if left == Some(0) {
@@ -269,8 +270,12 @@ impl Session {
             let is_first = so_far == film.first();
             let next = if is_first { film.coarse_goal().unwrap_or(pass) } else { pass };
             let goal = if next.is_beyond(budget.goal()) { budget.goal() } else { next };
+            let Some(tiles) = left.map_or(Some(usize::MAX), |left| film.tiles_within(goal, left, exceeds))
+            else {
+                break;
+            };
+            exceeds = false;
             let begun = Instant::now();
-            let tiles = left.map_or(usize::MAX, |left| film.tiles_within(goal, left));
             threads.install(|| engine.refine(scene, film, goal, tiles, &limits));
             spent.sampling += begun.elapsed();
         }
