@@ -16,9 +16,9 @@ const PIECE: usize = 1 << 11;
 /// The order of a block being found, in steps, so that a stop takes effect soon and the work can be resumed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct BlockOrder {
-    /// Of each path a code of its start, and its number in the lower half; each piece is sorted.
+    /// Of each path a code of its start, and its number in the lower half.
     keys: Vec<u64>,
-    /// Pieces that are computed.
+    /// Pieces whose keys are known.
     known: Vec<bool>,
 }
 
@@ -36,18 +36,17 @@ impl BlockOrder {
                 return;
             }
             let first = paths.start + cast::fit_u32(piece * PIECE);
-            for (path, key) in (first..).zip(&mut *keys) {
+            for (path, key) in (first..).zip(keys) {
                 *key = u64::from(morton(numbers.of(path).emission())) << u32::BITS | u64::from(path);
             }
-            keys.sort_unstable();
             *known = true;
         });
         if self.known.contains(&false) || limits.stop().reached() {
             return None;
         }
         let mut keys = std::mem::take(&mut self.keys);
-        // Merges the sorted pieces in a millisecond.
-        keys.sort();
+        // About a millisecond's work.
+        keys.par_sort_unstable();
         Some(keys.into_iter().map(cast::low_u32).collect())
     }
 }
