@@ -7,7 +7,7 @@ set -euo pipefail
 scene=$1
 samples=$2
 shift 2
-# The share's denominator must not change when a single task is submitted again.
+# Number of parts: the size of the array, also when one task alone is submitted again. For 8 parts: TYNDALL_PARTS=8 sbatch --array=1-8 ...
 parts=${TYNDALL_PARTS:-4}
 mkdir -p parts
 tyndall render "$scene" --samples "$samples" --part "$SLURM_ARRAY_TASK_ID/$parts" -q -o "parts/$SLURM_ARRAY_TASK_ID.exr" "$@"

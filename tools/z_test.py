@@ -4,8 +4,9 @@
   z_test.py OLD NEW SCENE...
 
 OLD and NEW are two builds of the program. Each scene is rendered by each method of NEW with each of them, with different seeds, and the differences of blocks of 4 x 4
-pixels are divided by their standard error. For two estimates of the same light such a score has mean 0, mean square 1 and rarely exceeds 4.
-`raymarch` has no noise but at the edges of pixels, so that its own variance serves. Exits with 1 if any score is beyond its bounds.
+pixels are divided by their standard error. For two estimates of the same light such a score has mean 0 and a mean square of at most 1, and rarely
+exceeds 4. In `raymarch` samples differ only by their position in the pixel; the variance of these is its error. Exits with 1 if any of these is out of bounds, or if
+blocks without noise differ.
 """
 import json, pathlib, subprocess, sys, tempfile
 import numpy as np, OpenEXR

@@ -44,7 +44,7 @@ pub enum Command {
     /// Play a list of edits against a live session: how fast each is, and how much was computed again
     #[command(allow_negative_numbers = true)]
     Replay(Box<ReplayOptions>),
-    /// Merge the parts of a render, in any order, to the bits of the whole
+    /// Merge the parts of a render, in any order, into exactly the picture of a single run
     Merge(MergeOptions),
     /// Show what the loader understood of a volume or of a scene's volume
     Info(InfoOptions),
@@ -90,19 +90,20 @@ pub struct RenderOptions {
     #[arg(long, value_name = "E", help_heading = "When to stop (whichever comes first)", value_parser = positive)]
     pub target_error: Option<f64>,
 
-    /// Render the K-th of N shares of the samples, to an OpenEXR file for `tyndall merge`
+    /// Render only part K of N, into an OpenEXR file for `tyndall merge`
     ///
-    /// Shares are multiples of 16 samples. Merged, they give the bits of a single run.
+    /// A part is a multiple of 16 samples, except that the last takes what is left. Merged, the parts give exactly the picture of a single run.
     #[arg(long, value_name = "K/N", help_heading = "In several runs", value_parser = share,
           conflicts_with_all = ["time", "target_error", "resume"])]
     pub part: Option<Share>,
 
-    /// Keep the samples in the OpenEXR file, so that --resume can go on from it
+    /// Keep the samples in the OpenEXR file, so that --resume can go on from them
     #[arg(long, help_heading = "In several runs")]
     pub resumable: bool,
 
-    /// Go on from the samples in FILE, of the same scene, to the bits of a single run; implies --resumable if an OpenEXR file is
-    /// written
+    /// Go on from the samples in FILE, which must be of the same scene; the picture is exactly that of a single run
+    ///
+    /// An OpenEXR file that is written can be resumed again.
     #[arg(long, value_name = "FILE", help_heading = "In several runs")]
     pub resume: Option<PathBuf>,
 
@@ -280,10 +281,10 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 
 fn share(text: &str) -> Result<Share, String> {
     let numbers =
-        text.split_once('/').and_then(|(number, of)| Some([number.parse().ok()?, of.parse().ok()?]));
+        text.split_once('/').and_then(|(number, count)| Some([number.parse().ok()?, count.parse().ok()?]));
     numbers
-        .map(|[number, of]| Share { number, of })
-        .filter(|share| (1..=share.of).contains(&share.number))
+        .map(|[number, count]| Share { number, count })
+        .filter(|share| (1..=share.count).contains(&share.number))
         .ok_or_else(|| "expected K/N with whole numbers, K from 1 to N, e.g. 2/4".into())
 }
 
@@ -312,7 +313,7 @@ mod tests {
         for bad in ["640", "0x4", "x", "4x-1", "axb"] {
             assert!(size(bad).is_err(), "{bad}");
         }
-        assert_eq!(share("2/4"), Ok(Share { number: 2, of: 4 }));
+        assert_eq!(share("2/4"), Ok(Share { number: 2, count: 4 }));
         for bad in ["0/4", "5/4", "1", "1/", "/", "1/0", "-1/2", "1/2/3", "a/b"] {
             assert!(share(bad).is_err(), "{bad}");
         }

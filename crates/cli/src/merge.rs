@@ -1,7 +1,7 @@
 //! `tyndall merge`.
 
 use crate::args::MergeOptions;
-use crate::parts::{Share, Stored};
+use crate::parts::{Share, StoredRender};
 use crate::{Failure, output};
 use std::path::Path;
 use tyndall::film::Film;
@@ -37,13 +37,13 @@ pub fn run(options: &MergeOptions) -> Result<(), Failure> {
 
 /// A part, of which only the metadata have been read.
 struct PartFile<'a> {
-    stored: Stored<'a>,
+    stored: StoredRender<'a>,
     share: Share,
 }
 
 impl<'a> PartFile<'a> {
     fn open(path: &'a Path) -> Result<Self, Failure> {
-        let stored = Stored::open(path)?;
+        let stored = StoredRender::open(path)?;
         let share = stored.info.part.ok_or_else(|| {
             Failure::input(format!(
                 "{}: a whole render, not a part of one; expected pictures that `render --part K/N` wrote",
@@ -58,7 +58,7 @@ impl<'a> PartFile<'a> {
         let film = self.stored.film()?;
         let range = self.share.of_samples(self.stored.info.samples);
         let is_its = range.is_some_and(|range| range.first == film.first() && range.end == film.samples());
-        if is_its && film.is_complete() {
+        if is_its && film.is_even() {
             return Ok(film);
         }
         let expected = range.map_or(0, |range| range.end - range.first);
@@ -74,19 +74,19 @@ impl<'a> PartFile<'a> {
 /// Refuses parts of different renders, a part that is there twice, and one that is missing; `parts` is in order.
 fn check_complete(parts: &[PartFile]) -> Result<(), Failure> {
     let Some(first) = parts.first() else { return Ok(()) };
-    let (of, samples) = (first.share.of, first.stored.info.samples);
+    let (count, samples) = (first.share.count, first.stored.info.samples);
     for part in parts {
         part.stored.check_mix(&first.stored)?;
         let (here, there) = (path_name(part.stored.path), path_name(first.stored.path));
         if part.stored.info.samples != samples {
             return Err(Failure::input(format!(
-                "{here}: a part of {} samples, but {there} is one of {samples}; expected parts of the same render",
+                "{here}: is part of a render of {} samples, but {there} of one of {samples}; expected parts of the same render",
                 part.stored.info.samples
             )));
         }
-        if part.share.of != of {
+        if part.share.count != count {
             return Err(Failure::input(format!(
-                "{here}: part {}, but {there} is part {}; expected the same number of parts",
+                "{here}: is part {}, but {there} is part {}; expected parts of a render that is shared in the same number",
                 part.share, first.share
             )));
         }
@@ -95,7 +95,7 @@ fn check_complete(parts: &[PartFile]) -> Result<(), Failure> {
         if pair[0].share == pair[1].share {
             let [one, other] = [0, 1].map(|i| path_name(pair[i].stored.path));
             return Err(Failure::input(format!(
-                "{other}: part {}, as is {one}; name each part once",
+                "{other}: is part {}, and so is {one}; name each part once",
                 pair[0].share
             )));
         }
@@ -104,15 +104,15 @@ fn check_complete(parts: &[PartFile]) -> Result<(), Failure> {
     let is_missing = |number: &u32| numbers.next_if_eq(number).is_none();
     // Enough to see what went wrong.
     let shown: Vec<String> =
-        (1..=of).filter(is_missing).take(5).map(|number| Share { number, of }.to_string()).collect();
+        (1..=count).filter(is_missing).take(5).map(|number| Share { number, count }.to_string()).collect();
     if shown.is_empty() {
         return Ok(());
     }
-    let more = of as usize - parts.len() - shown.len();
+    let more = count as usize - parts.len() - shown.len();
     let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     let shown = shown.join(", ");
     Err(Failure::input(format!(
-        "found {} of {of} parts, without {shown}{more}; expected all; render the others with --part",
+        "found {} of {count} parts; missing: {shown}{more}; render these with --part",
         parts.len()
     )))
 }

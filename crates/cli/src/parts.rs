@@ -11,18 +11,18 @@ use tyndall_formats::image::{ImageError, Metadata, PictureState, read_metadata, 
 use tyndall_live::document::{Document, value_from_json};
 use tyndall_live::{KeyDifference, LiveSession, first_difference};
 
-/// A share of a render's samples: the `number`-th of `of`, counted from 1.
+/// A share of a render's samples: the `number`-th of `count`, counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Share {
     /// Which part.
     pub number: u32,
     /// Number of parts.
-    pub of: u32,
+    pub count: u32,
 }
 
 impl Display for Share {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{}/{}", self.number, self.of)
+        write!(f, "{}/{}", self.number, self.count)
     }
 }
 
@@ -34,16 +34,17 @@ pub struct SampleRange {
 }
 
 impl Share {
-    /// Its samples out of all; parts begin with chunks, so that they can be merged to the bits of the whole. `None` if there are more
+    /// Its samples out of all; parts begin with chunks, so that they merge exactly into the whole. `None` if there are more
     /// parts than chunks.
     pub fn of_samples(self, samples: u32) -> Option<SampleRange> {
         let chunks = samples.div_ceil(Film::CHUNK);
         // The rounded products fit, since no part has more chunks than there are.
         let border = |part: u32| {
-            let chunk = u64::from(chunks) * u64::from(part) / u64::from(self.of);
+            let chunk = u64::from(chunks) * u64::from(part) / u64::from(self.count);
             u32::try_from(chunk * u64::from(Film::CHUNK)).unwrap_or(u32::MAX).min(samples)
         };
-        (self.of <= chunks).then(|| SampleRange { first: border(self.number - 1), end: border(self.number) })
+        (self.count <= chunks)
+            .then(|| SampleRange { first: border(self.number - 1), end: border(self.number) })
     }
 }
 
@@ -57,9 +58,9 @@ pub struct StateInfo {
     pub simd: String,
     /// Number of the first sample.
     pub first: u32,
-    /// The part that it is, and the number of samples of all parts; `None` for a whole render.
+    /// Which part it is, and of how many; `None` for a whole render.
     pub part: Option<Share>,
-    /// Number of samples of the whole render.
+    /// Number of samples that the scene asks for, of all parts together.
     pub samples: u32,
 }
 
@@ -86,7 +87,7 @@ impl StateInfo {
 
 /// A picture with its samples, of which only the metadata have been read.
 #[derive(Debug)]
-pub struct Stored<'a> {
+pub struct StoredRender<'a> {
     pub path: &'a Path,
     pub info: StateInfo,
     pub seed: String,
@@ -94,7 +95,7 @@ pub struct Stored<'a> {
     pub document: Document,
 }
 
-impl<'a> Stored<'a> {
+impl<'a> StoredRender<'a> {
     /// Reads the metadata of a picture.
     pub fn open(path: &'a Path) -> Result<Self, Failure> {
         let metadata = match read_metadata(path) {
@@ -106,9 +107,16 @@ impl<'a> Stored<'a> {
         let text = get(STATE)?;
         let info: StateInfo = serde_json::from_str(&text).map_err(|error| malformed(path, &error))?;
         let is_one =
-            |part: Share| (1..=part.of).contains(&part.number) && part.of_samples(info.samples).is_some();
+            |part: Share| (1..=part.count).contains(&part.number) && part.of_samples(info.samples).is_some();
         if !info.part.is_none_or(is_one) {
-            return Err(malformed(path, &"found a part that there cannot be"));
+            return Err(malformed(
+                path,
+                &format!(
+                    "found part {} of {} samples, which cannot be",
+                    info.part.unwrap_or(Share { number: 1, count: 1 }),
+                    info.samples
+                ),
+            ));
         }
         let document = value_from_json(&get(Metadata::SCENE)?).and_then(Document::from_value);
         let document = document.map_err(|error| malformed(path, &error))?;
@@ -123,7 +131,7 @@ impl<'a> Stored<'a> {
         if film.size() == self.document.film.size {
             Ok(film)
         } else {
-            Err(malformed(self.path, &"found another size"))
+            Err(malformed(self.path, &"the picture's size is not that of its scene"))
         }
     }
 
@@ -157,10 +165,10 @@ impl<'a> Stored<'a> {
     ) -> Result<(), String> {
         if self.version != version {
             let found = format!(
-                "its samples are by version {} of Tyndall, but {other} version {version}",
+                "its samples are from version {} of Tyndall, but {other} version {version}",
                 self.version
             );
-            return Err(format!("{found}; expected the same; render it again"));
+            return Err(format!("{found}; expected the same version; render one of them again"));
         }
         if self.seed != seed {
             let found = format!("its samples have seed {}, but {other} seed {seed}", self.seed);
@@ -171,12 +179,14 @@ impl<'a> Stored<'a> {
                 "its samples were taken with {} instructions, but {other} {}",
                 self.info.simd, info.simd
             );
-            return Err(format!("{found}, whose bits differ; set TYNDALL_SIMD to the same everywhere"));
+            return Err(format!(
+                "{found}, which give other bits; set TYNDALL_SIMD to the same value for all runs"
+            ));
         }
         if self.info.scene != info.scene {
             let found = match first_difference(&self.document, document) {
                 Some(KeyDifference { path, values: [here, there] }) => {
-                    format!("its scene has {here} as `{path}`, but {other} {there}")
+                    format!("in its scene `{path}` is {here}, but {other} {there}")
                 }
                 None => format!("its scene has other voxels or maps than {other}"),
             };
@@ -188,7 +198,7 @@ impl<'a> Stored<'a> {
 
 fn no_samples(path: &Path) -> Failure {
     Failure::input(format!(
-        "{}: found no samples to go on from; expected an OpenEXR picture that `render` wrote with --part or --resumable",
+        "{}: found no stored samples; expected an OpenEXR file written with --part (for `merge`) or --resumable (for --resume)",
         path_name(path)
     ))
 }
@@ -205,17 +215,17 @@ mod tests {
     fn shares_are_whole_chunks_that_cover_all_samples() {
         for samples in [1_u32, 16, 17, 64, 100, 1000, 1 << 31] {
             let chunks = samples.div_ceil(Film::CHUNK);
-            for of in [1, 2, 3, 4, 7, 62, 63].into_iter().filter(|&of| of <= chunks) {
+            for count in [1, 2, 3, 4, 7, 62, 63].into_iter().filter(|&count| count <= chunks) {
                 let mut next = 0;
-                for number in 1..=of {
-                    let SampleRange { first, end } = Share { number, of }.of_samples(samples).unwrap();
-                    assert!(first == next && end > first, "{number}/{of} of {samples}");
+                for number in 1..=count {
+                    let SampleRange { first, end } = Share { number, count }.of_samples(samples).unwrap();
+                    assert!(first == next && end > first, "{number}/{count} of {samples}");
                     assert!(first.is_multiple_of(Film::CHUNK));
                     next = end;
                 }
                 assert_eq!(next, samples);
             }
-            assert_eq!(Share { number: 1, of: chunks + 1 }.of_samples(samples), None);
+            assert_eq!(Share { number: 1, count: chunks + 1 }.of_samples(samples), None);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::args::RenderOptions;
 use crate::machine::{Interrupt, pool, vector_instructions};
-use crate::parts::{Share, StateInfo, Stored};
+use crate::parts::{Share, StateInfo, StoredRender};
 use crate::progress::Display;
 use crate::stats::{Stages, peak_memory};
 use crate::{Failure, output, overrides};
@@ -33,7 +33,7 @@ struct StopConditions {
 
 /// Renders INPUT to pictures and statistics.
 pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
-    let note = |text: &str| {
+    let detail = |text: &str| {
         if options.verbose {
             // Optional, like progress.
             drop(writeln!(std::io::stderr(), "tyndall: {text}"));
@@ -64,7 +64,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         }
     }
     let prepared = stages.end("prepare");
-    note(&format!(
+    detail(&format!(
         "loaded in {load_s:.2} s, prepared in {prepared:.2} s, {} threads, {}",
         threads.current_num_threads(),
         level.name()
@@ -89,7 +89,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
             let path = path_name(path);
             drop(writeln!(
                 std::io::stderr(),
-                "tyndall: note: {path} has the {samples} samples asked for already; ask for more with --samples"
+                "tyndall: note: {path} already has the {samples} samples asked for; ask for more with --samples"
             ));
         }
     }
@@ -120,7 +120,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
             "tyndall: note: {why} took {rendered:.1} s, more than the {asked} s of --time"
         ));
     }
-    note(&format!("{:.2} samples per pixel in {rendered:.2} s", live.film().mean_samples()));
+    detail(&format!("{:.2} samples per pixel in {rendered:.2} s", live.film().mean_samples()));
 
     output::pictures(&paths, live.film(), live.document(), live.folder(), info.as_ref())?;
     stages.end("write");
@@ -149,18 +149,18 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
 fn too_many_parts(part: Share, samples: u32) -> Failure {
     let most = samples.div_ceil(Film::CHUNK);
     Failure::usage(format!(
-        "--part {part}: {samples} samples are {most} times {}, the least that a part can have; expected at most {most} parts",
+        "--part {part}: {samples} samples are {most} chunks of up to {}, and a part needs one; expected at most {most} parts",
         Film::CHUNK
     ))
 }
 
 /// Continues with the samples in a file, to a number of `samples`.
 fn resume(live: &mut LiveSession, path: &Path, info: &StateInfo, samples: u32) -> Result<(), Failure> {
-    let stored = Stored::open(path)?;
+    let stored = StoredRender::open(path)?;
     let name = path_name(path);
     if let Some(part) = stored.info.part {
         return Err(Failure::input(format!(
-            "{name}: part {part} of a render; expected a whole one; merge the parts first"
+            "{name}: is part {part} of a render, and a part cannot be resumed; merge all parts first, with --resumable"
         )));
     }
     stored.check_session(info, live.document())?;
@@ -168,7 +168,7 @@ fn resume(live: &mut LiveSession, path: &Path, info: &StateInfo, samples: u32) -
     if film.most_samples() > samples {
         let found = film.most_samples();
         return Err(Failure::usage(format!(
-            "{name}: has {found} samples in some pixels already, more than the {samples} asked for; ask for more with --samples"
+            "{name}: some pixels already have {found} samples, more than the {samples} asked for; ask for at least {found} with --samples"
         )));
     }
     live.go_on_with(film).map_err(Failure::input)

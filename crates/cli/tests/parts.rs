@@ -1,4 +1,4 @@
-//! Renders in several runs: parts that are merged, and renders that go on later, to the bits of a single run.
+//! Renders in several runs: parts that are merged, and renders that are resumed, both exactly as a single run.
 
 mod support;
 
@@ -96,10 +96,10 @@ fn a_render_goes_on_to_the_file_of_a_single_run() {
         // Nothing to do is worth a word: the picture's own scene asks for what it has now.
         let Ended { status, stderr, .. } =
             folder.run(&["render", "a.exr", "--resume", "a.exr", "-o", "d.exr"]);
-        assert!(status == Some(0) && stderr.contains("has the 100 samples asked for already"), "{stderr}");
+        assert!(status == Some(0) && stderr.contains("already has the 100 samples asked for"), "{stderr}");
         assert!(written(&folder, "d.exr") == written(&folder, "a.exr"), "{method}");
         let less = ["render", "a.exr", "--samples", "50", "--resume", "a.exr", "-o", "a.png"];
-        refused(&folder, 2, &less, &["a.exr", "100 samples in some pixels already", "--samples"]);
+        refused(&folder, 2, &less, &["a.exr", "some pixels already have 100 samples", "--samples"]);
     }
 }
 
@@ -154,7 +154,7 @@ fn an_interrupted_render_goes_on_and_an_interrupted_part_is_refused() {
     let samples: u32 = few.parse().expect("a number");
     // Tiles may be some passes ahead of others.
     let resumed = ["render", "../scene.toml", "--samples", few, "--resume", "a.exr", "-o", "b.exr"];
-    refused(&folder, 2, &[&resumed[..], &big].concat(), &["a.exr", "in some pixels already", "--samples"]);
+    refused(&folder, 2, &[&resumed[..], &big].concat(), &["a.exr", "some pixels already have", "--samples"]);
     let all = format!("{}", samples + 20);
     run(
         &folder,
@@ -169,7 +169,7 @@ fn an_interrupted_render_goes_on_and_an_interrupted_part_is_refused() {
     interrupted(&["--samples", "1000000", "--part", "1/1", "-o", "p.exr"]);
     refused(&folder, 1, &["merge", "p.exr", "-o", "m.exr"], &["p.exr", "interrupted", "render it again"]);
     let resume = ["render", "p.exr", "--resume", "p.exr", "-o", "m.exr"];
-    refused(&folder, 1, &resume, &["p.exr", "part 1/1", "merge the parts first"]);
+    refused(&folder, 1, &resume, &["p.exr", "part 1/1", "merge all parts first"]);
 }
 
 #[test]
@@ -197,17 +197,22 @@ fn mixtures_are_refused_by_name() {
     run(&folder, &["merge", "part1.exr", "other.exr", "part3.exr", "-o", "m.exr"]);
 
     let merge = |files: &[&'static str]| [&["merge", "-o", "m.exr"], files].concat();
-    refused(&folder, 1, &merge(&["part1.exr", "part2.exr", "part2.exr", "part3.exr"]), &["part 2/3, as is"]);
+    refused(
+        &folder,
+        1,
+        &merge(&["part1.exr", "part2.exr", "part2.exr", "part3.exr"]),
+        &["is part 2/3, and so is"],
+    );
     refused(&folder, 1, &merge(&["part1.exr", "part3.exr"]), &["2 of 3 parts", "2/3"]);
     render(&folder, &["--part", "1/2", "-o", "half.exr"]);
-    refused(&folder, 1, &merge(&["part1.exr", "half.exr"]), &["1/2", "1/3", "same number of parts"]);
+    refused(&folder, 1, &merge(&["part1.exr", "half.exr"]), &["1/2", "1/3", "shared in the same number"]);
     render(&folder, &["--resumable", "-o", "whole.exr", "-o", "plain.png"]);
     refused(&folder, 1, &merge(&["part1.exr", "whole.exr"]), &["whole.exr", "not a part"]);
     render(&folder, &["-o", "plain.exr"]);
     for plain in ["plain.exr", "plain.png", "../scene.toml"] {
-        refused(&folder, 1, &merge(&["part1.exr", plain]), &[plain, "no samples"]);
+        refused(&folder, 1, &merge(&["part1.exr", plain]), &[plain, "no stored samples"]);
         let resume = ["render", "../scene.toml", "--resume", plain, "-o", "m.exr"];
-        refused(&folder, 1, &resume, &[plain, "no samples"]);
+        refused(&folder, 1, &resume, &[plain, "no stored samples"]);
     }
     refused(&folder, 1, &merge(&["gone.exr"]), &["gone.exr", "cannot read"]);
     let seed = ["render", "../scene.toml", "--seed", "1", "--resume", "whole.exr", "-o", "m.exr"];
@@ -238,7 +243,7 @@ fn other_versions_and_instructions_are_refused() {
     refused(&folder, 1, &changed("\"number\":2", "\"number\":7"), &["changed.exr", "cannot be read"]);
     refused(&folder, 1, &changed("\"first\":48", "\"first\":47"), &["changed.exr", "multiple of 16"]);
     refused(&folder, 1, &changed("\"first\":48", "\"first\":96"), &["changed.exr", "samples"]);
-    refused(&folder, 1, &changed("state.samples", "state.sampled"), &["changed.exr", "`samples`"]);
+    refused(&folder, 1, &changed("state.next", "state.nixt"), &["changed.exr", "`state.next`"]);
     let cut = &part[..part.len() * 2 / 3];
     folder.put("out/changed.exr", cut);
     refused(&folder, 1, &["merge", "part1.exr", "changed.exr", "-o", "m.exr"], &["changed.exr"]);

@@ -9,7 +9,7 @@ use std::hash::Hasher;
 use tyndall::message::excerpt;
 use tyndall::volume::Volume;
 
-/// A scene without what its samples do not depend on: paths, number of samples, tone and exposure, settings of other methods. The
+/// Everything in a scene that its samples depend on: not paths, the number of samples, tone, exposure and the settings of other methods. The
 /// seed is apart, since mixing seeds deserves a message of its own.
 #[derive(Clone, Debug)]
 pub struct SceneIdentity {
@@ -35,7 +35,7 @@ impl SceneIdentity {
         Self { document: essence(document), data: data.finish() }
     }
 
-    /// Its hash, in hexadecimal. Equal hashes mean equal scenes.
+    /// Its hash, in hexadecimal. Scenes with equal hashes have the same samples, apart from the seed.
     #[must_use]
     pub fn hash(&self) -> String {
         let mut hash = Fingerprint::default();
@@ -86,7 +86,7 @@ fn differing(path: &str, one: &Value, other: &Value) -> Option<KeyDifference> {
     deeper.or_else(|| Some(KeyDifference { path: path.to_owned(), values: [shown(one), shown(other)] }))
 }
 
-/// The document without what samples do not depend on.
+/// The parts of a document that samples depend on.
 fn essence(document: &Document) -> Value {
     let mut value = document.to_value();
     let table =
@@ -130,7 +130,7 @@ impl Fingerprint {
         pieces.iter().for_each(|piece| self.0.write(&piece.to_le_bytes()));
     }
 
-    /// Adds samples, how they are read, and where they lie.
+    /// Adds voxels, how their values are read, and where they lie.
     fn add_volume(&mut self, volume: &Volume) {
         let (grid, map) = (volume.grid(), volume.value_map());
         self.add(format!("{} {:?} {:?}", volume.type_name(), grid.space(), grid.dims()).as_bytes());

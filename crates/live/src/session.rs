@@ -12,11 +12,13 @@ use crate::undo::UndoList;
 use serde_json::Value;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tyndall::film::{Film, Image, Tone, Viewer};
 use tyndall::integrator::{MethodReport, Resources, method_of};
 use tyndall::scene::{Difference, Scene};
 use tyndall::session::{Budget, Progress, Session};
+use tyndall::volume::Volume;
 
 /// A scene that can be edited and is rendered progressively.
 ///
@@ -100,6 +102,7 @@ impl LiveSession {
         let built = Built::new(document, assets, &options.threads)
             .map_err(|source| LiveError::Scene { at: at.to_owned(), source })?;
         admission::method(&built.scene, at)?;
+        count_values(&built.assets.volume, options);
         Ok(built)
     }
 
@@ -195,6 +198,9 @@ impl LiveSession {
             .map_err(|source| LiveError::Scene { at: at.to_owned(), source })?;
         if more_memory {
             admission::method(&built.scene, at)?;
+        }
+        if !Arc::ptr_eq(&built.assets.volume, &self.built.assets.volume) {
+            count_values(&built.assets.volume, &self.options);
         }
         let to_scene = begun.elapsed();
         let difference = self.session.set_scene(built.scene.clone());
@@ -303,6 +309,16 @@ impl LiveSession {
     #[must_use]
     pub fn report(&self) -> MethodReport {
         self.session.report()
+    }
+}
+
+/// Counts the values of a new volume, as part of loading it: methods whose light is kept through edits need the counts, and would
+/// take them in the middle of a time slice.
+fn count_values(volume: &Volume, options: &Options) {
+    if options.edits {
+        options.threads.install(|| {
+            let _counted = volume.value_bin_histogram();
+        });
     }
 }
 

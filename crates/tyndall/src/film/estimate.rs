@@ -22,7 +22,7 @@ pub(super) const CHUNK: u32 = 16;
 pub(super) const FAN_OUT: u32 = 4;
 
 /// Number of samples in a child of a node of this level; the children of level 0 are chunks.
-pub(super) fn samples_below(level: usize) -> u64 {
+pub(super) fn samples_per_child(level: usize) -> u64 {
     u64::from(CHUNK) * u64::from(FAN_OUT).pow(cast::fit_u32(level))
 }
 
@@ -53,12 +53,12 @@ impl Sums {
     /// The estimate from these samples, whose number is `n`.
     pub fn estimate(&self, n: f64) -> Estimate {
         // Rounding may make this negative if all samples are equal.
-        let scatter = |squares: f64, sum: f64| cast::single((squares - sum * sum / n).max(0.0));
+        let spread = |squares: f64, sum: f64| cast::single((squares - sum * sum / n).max(0.0));
         let mean = |sum: f64| mean_of(sum, n);
         Estimate {
             mean: self.radiance.map(mean),
-            scatter: std::array::from_fn(|c| scatter(self.squares[c], self.radiance[c])),
-            luminance_scatter: scatter(self.luminance_squares, luminance_of(self.radiance)),
+            spread: std::array::from_fn(|c| spread(self.squares[c], self.radiance[c])),
+            luminance_spread: spread(self.luminance_squares, luminance_of(self.radiance)),
             alpha: mean(self.alpha),
             depth: mean(self.depth),
         }
@@ -84,9 +84,9 @@ pub(super) fn merged_mean(a: f32, b: f32, share: f64) -> f32 {
 pub(super) struct Estimate {
     pub mean: [f32; 3],
     /// Sum of squared deviations from the mean.
-    pub scatter: [f32; 3],
+    pub spread: [f32; 3],
     /// The same of the luminance.
-    pub luminance_scatter: f32,
+    pub luminance_spread: f32,
     pub alpha: f32,
     /// Mean of distance times alpha.
     pub depth: f32,
@@ -97,17 +97,14 @@ impl Estimate {
     pub fn merged(&self, n: f64, other: &Self, m: f64) -> Self {
         let share = m / (n + m);
         let mean = |a: f32, b: f32| merged_mean(a, b, share);
-        let scatter = |[a, b]: [f32; 2], apart: f64| {
+        let spread = |[a, b]: [f32; 2], apart: f64| {
             cast::single(f64::from(a) + f64::from(b) + apart * apart * n * share)
         };
         let apart: [f64; 3] = std::array::from_fn(|c| f64::from(other.mean[c]) - f64::from(self.mean[c]));
         Self {
             mean: std::array::from_fn(|c| mean(self.mean[c], other.mean[c])),
-            scatter: std::array::from_fn(|c| scatter([self.scatter[c], other.scatter[c]], apart[c])),
-            luminance_scatter: scatter(
-                [self.luminance_scatter, other.luminance_scatter],
-                luminance_of(apart),
-            ),
+            spread: std::array::from_fn(|c| spread([self.spread[c], other.spread[c]], apart[c])),
+            luminance_spread: spread([self.luminance_spread, other.luminance_spread], luminance_of(apart)),
             alpha: mean(self.alpha, other.alpha),
             depth: mean(self.depth, other.depth),
         }

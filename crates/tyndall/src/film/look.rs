@@ -15,10 +15,12 @@ pub struct Tone {
     pub stops: f32,
 }
 
-/// A viewer of a film, which remembers what it has seen of it. Each look updates the tiles that have changed in a picture
-/// that the caller keeps; a viewer that looks in more than one way, or into more than one picture, renews them all.
+/// A viewer of a film, which remembers what it has seen of it. Each look updates, in a picture that the caller keeps, the tiles that
+/// have changed; all of them if the film's size or the tone is another than at the last look. Use one viewer for each picture: it
+/// does not notice that it is given another one of the same size.
 ///
-/// A pixel without a sample shows the first pixel of its block; a tile without samples keeps what the picture showed before.
+/// A pixel without a sample shows the first pixel of the smallest square around it (2, 4 or 8 pixels wide) whose first pixel has one; a tile
+/// without samples keeps what the picture showed before.
 #[derive(Clone, Debug, Default)]
 pub struct Viewer {
     size: [u32; 2],
@@ -58,7 +60,7 @@ impl Viewer {
             *picture = vec![[0; 3]; pixels];
             self.size = [0; 2];
         }
-        self.face(film, Some(tone));
+        self.forget_if_other(film, Some(tone));
         let width = self.size[0] as usize;
         let columns = width.div_ceil(TILE as usize);
         let bands = picture.par_chunks_mut(width * TILE as usize);
@@ -80,7 +82,7 @@ impl Viewer {
             *picture = Image::empty(film.size);
             self.size = [0; 2];
         }
-        self.face(film, None);
+        self.forget_if_other(film, None);
         let changed = changed(film.generation, &film.tiles, &mut self.seen);
         for tile in &changed {
             picture.update(tile);
@@ -95,7 +97,7 @@ impl Viewer {
     }
 
     /// Forgets what it has seen if that was of another size or shown in another way.
-    fn face(&mut self, film: &Film, tone: Option<Tone>) {
+    fn forget_if_other(&mut self, film: &Film, tone: Option<Tone>) {
         if self.size != film.size || self.tone != tone {
             let seen = vec![Revision::default(); film.tiles.len()];
             *self = Self { size: film.size, tone, seen, changed: Vec::new() };

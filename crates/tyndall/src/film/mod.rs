@@ -1,7 +1,7 @@
 //! The film: mean and variance of every pixel.
 //!
 //! The film is divided into tiles, each processed by one thread at a time, so that neighbouring pixels never share a
-//! cache line across threads and a tile may be a sample ahead of another.
+//! cache line across threads and a tile may be some samples ahead of another.
 
 mod columns;
 mod estimate;
@@ -42,7 +42,7 @@ fn luminance_of([r, g, b]: [f64; 3]) -> f64 {
 /// A picture being rendered.
 #[derive(Clone, Debug)]
 pub struct Film {
-    /// Tells it from every other film of this process, so that a viewer notices a new one.
+    /// Tells it from every other film of this process except its clones, so that a viewer notices a new one.
     generation: u64,
     size: [u32; 2],
     tiles: Vec<Tile>,
@@ -87,7 +87,7 @@ impl Image {
             self.rgba[i] = [r, g, b, pixel.alpha];
             let of_mean =
                 |s: f32| if n > 1.0 { cast::single(f64::from(s) / (n * (n - 1.0))) } else { f32::INFINITY };
-            self.variance[i] = pixel.scatter.map(of_mean);
+            self.variance[i] = pixel.spread.map(of_mean);
             self.depth[i] = if pixel.alpha > 0.0 { pixel.depth / pixel.alpha } else { f32::INFINITY };
         }
     }
@@ -117,7 +117,7 @@ impl Film {
         Self { generation: new_generation(), size, tiles: (0..columns * rows).map(tile).collect() }
     }
 
-    /// Forgets all samples, but keeps the memory for those of a whole picture.
+    /// Forgets all samples but keeps the memory; the film is then that of a whole picture, whatever part it was of.
     pub fn clear(&mut self) {
         self.generation = new_generation();
         self.tiles.iter_mut().for_each(Tile::clear);
@@ -129,7 +129,7 @@ impl Film {
     /// # Panics
     /// If they are not, or differ in size.
     pub fn append(&mut self, part: &Self) {
-        assert!(self.is_complete() && part.is_complete(), "parts of whole samples");
+        assert!(self.is_even() && part.is_even(), "parts with the same number of samples in every pixel");
         assert_eq!((self.size, self.samples()), (part.size, part.first()), "parts that follow each other");
         assert!(self.samples().is_multiple_of(CHUNK), "a part that ends with a chunk");
         self.generation = new_generation();
@@ -144,7 +144,7 @@ impl Film {
 
     /// Whether every pixel has the same number of samples.
     #[must_use]
-    pub fn is_complete(&self) -> bool {
+    pub fn is_even(&self) -> bool {
         let goal = Goal::samples(self.samples());
         self.tiles.iter().all(|tile| tile.taken() == tile.taken_at(goal))
     }
@@ -196,19 +196,19 @@ impl Film {
         self.tiles.iter().all(|tile| tile.has_reached(goal))
     }
 
-    /// The coarsest stride whose pixels do not all have a sample yet; `None` if even the finest do.
+    /// The goal of giving a first sample to the pixels of the coarsest stride that still lacks some; `None` if even the finest lacks none.
     pub(crate) fn coarse_goal(&self) -> Option<Goal> {
         let goals = Stride::ALL.map(|stride| Goal { samples: self.first(), more: Some(stride) });
         goals.into_iter().find(|&goal| !self.has_reached(goal))
     }
 
-    /// Number of tiles, from the first, that come as far as a goal with at most this many samples of all their pixels, or at least with
-    /// those of one tile; `None` if that is more than `most` and `exceeds` does not allow it.
-    pub(crate) fn tiles_within(&self, goal: Goal, most: u64, exceeds: bool) -> Option<usize> {
+    /// Number of tiles, from the first, that can reach a goal with at most `most` samples of all their pixels together. If not even one
+    /// tile can: that one if `may_exceed`, otherwise `None`.
+    pub(crate) fn tiles_within(&self, goal: Goal, most: u64, may_exceed: bool) -> Option<usize> {
         let mut all = 0;
         for (i, tile) in self.tiles.iter().enumerate() {
             let due = tile.taken_at(goal).saturating_sub(tile.taken()) as u64;
-            if all + due > most && (all > 0 || !exceeds) {
+            if all + due > most && (all > 0 || !may_exceed) {
                 return (all > 0).then_some(i);
             }
             all += due;
@@ -223,13 +223,13 @@ impl Film {
         covered as f64 / self.pixel_count() as f64
     }
 
-    /// Samples that it has of all pixels together.
+    /// Samples that it has of all pixels together, without those of earlier parts.
     #[must_use]
     pub fn pixel_samples(&self) -> u64 {
         self.tiles.iter().map(|tile| tile.taken() as u64).sum()
     }
 
-    /// Samples that it has per pixel, averaged over the picture.
+    /// Samples that it has per pixel, averaged over the picture; without those of earlier parts, unlike [`Self::samples`].
     #[must_use]
     pub fn mean_samples(&self) -> f64 {
         self.pixel_samples() as f64 / self.pixel_count() as f64
@@ -283,7 +283,7 @@ impl Film {
         let mut sum = 0.0;
         let mut count = 0.0;
         for PixelEstimate { samples: n, estimate: pixel, .. } in self.pixels() {
-            let variance = f64::from(pixel.luminance_scatter.max(0.0)) / (n * (n - 1.0));
+            let variance = f64::from(pixel.luminance_spread.max(0.0)) / (n * (n - 1.0));
             let mean = luminance_of(pixel.mean.map(f64::from));
             sum += variance / (mean * mean + 0.01 * whole * whole).max(f64::MIN_POSITIVE);
             count += 1.0;

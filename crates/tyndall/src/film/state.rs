@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 /// The samples of a film: numbers for each pixel, row by row from the top.
 ///
-/// Layer `samples` is the number of the sample that the pixel takes next. Samples are stored as `film/estimate.rs` describes:
+/// Layer `next` is the number of the sample that the pixel takes next. Samples are stored as `film/estimate.rs` describes:
 /// `node.L.Q` is quantity `Q` of the merged children of the incomplete node of level `L`, and `edge.L.K.Q` that of the `K`-th child
 /// of a node that begins before the first sample. `open.Q.high` and `open.Q.low` are the two halves of the sums over the incomplete
 /// chunk, in double precision. Where a pixel has none of these, they are 0.
@@ -57,13 +57,13 @@ impl StateValues {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StateError {
     /// A layer is missing, of the wrong type or of the wrong size.
-    #[error("found no layer `{0}` with a number for each pixel, which its samples need")]
+    #[error("found no layer `state.{0}` of the right type with a number for each pixel")]
     Layer(String),
     /// The number of the first sample does not begin a chunk.
     #[error("found {0} as the number of its first sample, expected a multiple of {CHUNK}")]
     First(u32),
     /// A pixel's number of samples does not fit those of the pixels around it.
-    #[error("found {found} samples in pixel {position:?}, expected {expected}, as its neighbours have")]
+    #[error("found {found} samples in pixel {position:?}, expected {expected}, to fit the rest of its tile")]
     Samples {
         /// Column and row.
         position: [u32; 2],
@@ -74,8 +74,8 @@ pub enum StateError {
     },
 }
 
-/// Name of the layer with the number of samples.
-const SAMPLES: &str = "samples";
+/// Name of the layer with the number of the sample that each pixel takes next.
+const NEXT: &str = "next";
 
 /// Names of the quantities, in their order: means of red, green and blue, the spread of each and of luminance, alpha, depth.
 const NAMES: [&str; QUANTITIES] = ["R", "G", "B", "RR", "GG", "BB", "YY", "A", "Z"];
@@ -83,7 +83,7 @@ const NAMES: [&str; QUANTITIES] = ["R", "G", "B", "RR", "GG", "BB", "YY", "A", "
 fn name_of(place: Place, quantity: usize) -> String {
     let quantity = NAMES[quantity];
     match place {
-        Place::Edge(child) => format!("edge.{}.{}.{quantity}", child.level, child.sibling()),
+        Place::Edge(child) => format!("edge.{}.{}.{quantity}", child.parent_level, child.sibling()),
         Place::Node(level) => format!("node.{level}.{quantity}"),
         Place::Open => format!("open.{quantity}"),
     }
@@ -102,7 +102,7 @@ impl Film {
         let mut stored: Vec<(Place, [Vec<f64>; QUANTITIES])> = Vec::new();
         for tile in &self.tiles {
             for pixel in 0..tile.pixel_count() {
-                next[self.index_of(tile.position(pixel))] = tile.samples_of(pixel);
+                next[self.index_of(tile.position(pixel))] = tile.next_sample(pixel);
             }
             for StoredAt { pixel, place } in tile.stored() {
                 let known = stored.iter().position(|(known, _)| *known == place);
@@ -116,7 +116,7 @@ impl Film {
                 }
             }
         }
-        let mut layers = vec![StateLayer { name: SAMPLES.to_owned(), values: StateValues::Whole(next) }];
+        let mut layers = vec![StateLayer { name: NEXT.to_owned(), values: StateValues::Whole(next) }];
         for (place, quantities) in stored {
             for (quantity, values) in quantities.into_iter().enumerate() {
                 let name = name_of(place, quantity);
@@ -146,7 +146,7 @@ impl Film {
         let layers = Layers::new(state, film.pixel_count());
         let width = state.size[0] as usize;
         let index_of = |[x, y]: [u32; 2]| y as usize * width + x as usize;
-        let next = layers.whole(SAMPLES)?;
+        let next = layers.whole(NEXT)?;
         let mut stored: Vec<(Place, [Values; QUANTITIES])> = Vec::new();
         for tile in &mut film.tiles {
             tile.go_on_after(|position| next[index_of(position)]).map_err(

@@ -223,7 +223,7 @@ impl Tile {
     }
 
     /// Number of the sample that a pixel takes next.
-    pub(super) fn samples_of(&self, pixel: usize) -> u32 {
+    pub(super) fn next_sample(&self, pixel: usize) -> u32 {
         self.samples + u32::from(usize::from(self.order.numbers[pixel]) < self.ahead)
     }
 
@@ -247,7 +247,7 @@ impl Tile {
         self.noise.relative_variance(self.taken() as f64 / self.pixel_count() as f64)
     }
 
-    /// For each pixel, row by row, that pixel or, if it has no sample, the first one of its block that has; `None` if all have a sample.
+    /// For each pixel, row by row, that pixel or, if it has no sample, the first pixel of the smallest square around it whose first pixel has one; `None` if all have a sample.
     /// At least the tile's first pixel must have one.
     pub(super) fn shown(&self) -> Option<Vec<usize>> {
         if self.covered() == self.pixel_count() {
@@ -285,7 +285,7 @@ impl Tile {
     pub(super) fn pixels(&self) -> impl Iterator<Item = PixelEstimate> {
         let [before, after] = self.pieces();
         (0..self.pixel_count()).map(move |pixel| {
-            let next = self.samples_of(pixel);
+            let next = self.next_sample(pixel);
             PixelEstimate {
                 position: self.position(pixel),
                 samples: f64::from(next - self.first()),
@@ -298,7 +298,7 @@ impl Tile {
     pub(super) fn stored(&self) -> Vec<StoredAt> {
         let [before, after] = self.pieces();
         let of_pixel = |pixel| {
-            let pieces = if self.samples_of(pixel) > self.samples { &after } else { &before };
+            let pieces = if self.next_sample(pixel) > self.samples { &after } else { &before };
             pieces.iter().map(move |piece| StoredAt { pixel, place: piece.place })
         };
         (0..self.pixel_count()).flat_map(of_pixel).collect()
@@ -352,7 +352,7 @@ pub(super) struct StoredAt {
     pub place: Place,
 }
 
-/// The state of a pixel.
+/// A pixel's estimate, with its position in the film and the number of samples behind it, without those of earlier parts.
 pub(super) struct PixelEstimate {
     pub position: [u32; 2],
     pub samples: f64,

@@ -7,7 +7,7 @@
 use super::PixelSample;
 use super::columns::Columns;
 use super::estimate::{
-    CHUNK, Estimate, FAN_OUT, LUMINANCE_SPREAD, QUANTITIES, Sums, mean_of, merged_mean, samples_below,
+    CHUNK, Estimate, FAN_OUT, LUMINANCE_SPREAD, QUANTITIES, Sums, mean_of, merged_mean, samples_per_child,
 };
 use super::tone::{BATCH, Planes};
 use crate::math::{LUMINANCE, cast};
@@ -30,19 +30,19 @@ pub(super) struct Tree {
 /// A child of a node: a chunk, or a node of the level below.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Child {
-    /// The level of its parent.
-    pub level: usize,
-    /// Its number among all children of this level.
+    /// The level of the node that it is a child of.
+    pub parent_level: usize,
+    /// Its number among all children of such nodes.
     pub number: u32,
 }
 
 impl Child {
     fn begins(self) -> u64 {
-        u64::from(self.number) * samples_below(self.level)
+        u64::from(self.number) * samples_per_child(self.parent_level)
     }
 
     fn ends(self) -> u64 {
-        self.begins() + samples_below(self.level)
+        self.begins() + samples_per_child(self.parent_level)
     }
 
     /// Its number among the children of its parent.
@@ -51,7 +51,7 @@ impl Child {
     }
 
     fn parent_begins(self) -> u64 {
-        u64::from(self.number - self.sibling()) * samples_below(self.level)
+        u64::from(self.number - self.sibling()) * samples_per_child(self.parent_level)
     }
 
     fn next(self) -> Self {
@@ -60,7 +60,7 @@ impl Child {
 
     /// Its parent, as a child.
     fn parent(self) -> Self {
-        Self { level: self.level + 1, number: self.number / FAN_OUT }
+        Self { parent_level: self.parent_level + 1, number: self.number / FAN_OUT }
     }
 }
 
@@ -95,18 +95,18 @@ pub(super) fn pieces(first: u32, end: u32) -> Vec<Piece> {
         all += samples;
         pieces.push(Piece { place, samples, share: samples / all });
     };
-    let mut child = Child { level: 0, number: cast::low_u32(first / u64::from(CHUNK)) };
+    let mut child = Child { parent_level: 0, number: cast::low_u32(first / u64::from(CHUNK)) };
     while child.ends() <= end {
         if child.sibling() == 0 {
             child = child.parent();
         } else {
-            add(Place::Edge(child), samples_below(child.level));
+            add(Place::Edge(child), samples_per_child(child.parent_level));
             child = child.next();
         }
     }
-    let levels = (0..).take_while(|&level| samples_below(level) <= end).count();
+    let levels = (0..).take_while(|&level| samples_per_child(level) <= end).count();
     for level in (0..levels).rev() {
-        let size = samples_below(level);
+        let size = samples_per_child(level);
         let merged = end / size % u64::from(FAN_OUT) * size;
         let begins = end / size * size - merged;
         if merged > 0 && begins >= first {
@@ -122,7 +122,7 @@ pub(super) fn pieces(first: u32, end: u32) -> Vec<Piece> {
 /// Bytes per pixel from sample number `first` until there are `end`: 72 for the incomplete chunk, and 36 for each node and for each
 /// complete child of a node that begins before the first.
 pub(super) fn bytes_of_pixel(first: u32, end: u32) -> usize {
-    let levels = (0..).take_while(|&level| samples_below(level) <= u64::from(end)).count();
+    let levels = (0..).take_while(|&level| samples_per_child(level) <= u64::from(end)).count();
     let edges = pieces(first, end).iter().filter(|piece| matches!(piece.place, Place::Edge(_))).count();
     size_of::<Sums>() + (levels + edges) * size_of::<Estimate>()
 }
@@ -153,18 +153,18 @@ impl Tree {
         let mut sums = if begins { Sums::default() } else { bytemuck::cast(open.get(pixel)) };
         sums.add(sample);
         if (number + 1).is_multiple_of(CHUNK) {
-            let chunk = Child { level: 0, number: number / CHUNK };
-            self.complete(pixel, chunk, sums.estimate(f64::from(CHUNK)));
+            let chunk = Child { parent_level: 0, number: number / CHUNK };
+            self.add_child(pixel, chunk, sums.estimate(f64::from(CHUNK)));
         } else {
             open.set(pixel, bytemuck::cast(sums));
         }
     }
 
     /// Merges a pixel's complete child into its parent, and each node that this completes into its own.
-    fn complete(&mut self, pixel: usize, mut child: Child, mut estimate: Estimate) {
+    fn add_child(&mut self, pixel: usize, mut child: Child, mut estimate: Estimate) {
         while child.parent_begins() >= u64::from(self.first) {
-            let node = self.node_mut(child.level);
-            let (before, size) = (child.sibling(), samples_below(child.level) as f64);
+            let node = self.node_mut(child.parent_level);
+            let (before, size) = (child.sibling(), samples_per_child(child.parent_level) as f64);
             if before > 0 {
                 let merged: Estimate = bytemuck::cast(node.get(pixel));
                 estimate = merged.merged(f64::from(before) * size, &estimate, size);
@@ -195,7 +195,7 @@ impl Tree {
     }
 
     /// The estimates of a piece; `None` for the incomplete chunk.
-    fn complete_at(&self, place: Place) -> Option<&Columns<f32>> {
+    fn estimates_at(&self, place: Place) -> Option<&Columns<f32>> {
         match place {
             Place::Edge(child) => self.edges.iter().find(|(known, _)| *known == child).map(|edge| &edge.1),
             Place::Node(level) => self.nodes.get(level),
@@ -208,7 +208,7 @@ impl Tree {
         let mut whole = Estimate::default();
         let mut n = 0.0;
         for piece in pieces {
-            let part = match (self.complete_at(piece.place), &self.open) {
+            let part = match (self.estimates_at(piece.place), &self.open) {
                 (Some(estimates), _) => bytemuck::cast(estimates.get(pixel)),
                 (None, Some(open)) => bytemuck::cast::<_, Sums>(open.get(pixel)).estimate(piece.samples),
                 (None, None) => Estimate::default(),
@@ -224,7 +224,7 @@ impl Tree {
     pub fn radiance(&self, pieces: &[Piece], planes: &mut Planes) {
         for (channel, plane) in planes.iter_mut().enumerate() {
             for piece in pieces {
-                if let Some(estimates) = self.complete_at(piece.place) {
+                if let Some(estimates) = self.estimates_at(piece.place) {
                     for (mean, &part) in plane.iter_mut().zip(estimates.column(channel)) {
                         merge(mean, part, piece.share);
                     }
@@ -244,7 +244,7 @@ impl Tree {
         for &Piece { place, samples: m, share } in pieces {
             // Samples before these.
             let n = m / share - m;
-            if let Some(estimates) = self.complete_at(place) {
+            if let Some(estimates) = self.estimates_at(place) {
                 let [r, g, b, s] = [0, 1, 2, LUMINANCE_SPREAD].map(|quantity| estimates.column(quantity));
                 for i in 0..self.pixels {
                     let here = f64::from(r[i]) * red + f64::from(g[i]) * green + f64::from(b[i]) * blue;
@@ -267,10 +267,10 @@ impl Tree {
     /// Adds the samples of another tree, of which all pixels have those before `end`; they begin where the samples here end.
     pub fn append(&mut self, other: &Self, end: u32) {
         for piece in pieces(other.first, end) {
-            match (piece.place, other.complete_at(piece.place)) {
+            match (piece.place, other.estimates_at(piece.place)) {
                 (Place::Edge(child), Some(estimates)) => {
                     for pixel in 0..self.pixels {
-                        self.complete(pixel, child, bytemuck::cast(estimates.get(pixel)));
+                        self.add_child(pixel, child, bytemuck::cast(estimates.get(pixel)));
                     }
                 }
                 // The node begins where the samples here end, so that there is nothing to merge it with.
@@ -282,7 +282,7 @@ impl Tree {
 
     /// A pixel's values in a piece, as stored: sums over an incomplete chunk, or an estimate.
     pub fn stored(&self, pixel: usize, place: Place) -> [f64; QUANTITIES] {
-        match (self.complete_at(place), &self.open) {
+        match (self.estimates_at(place), &self.open) {
             (Some(estimates), _) => estimates.get(pixel).map(f64::from),
             (None, Some(open)) => open.get(pixel),
             (None, None) => [0.0; QUANTITIES],

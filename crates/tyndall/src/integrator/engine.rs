@@ -19,7 +19,7 @@ pub(crate) trait Engine: Send + Sync {
     /// See [`Method::update`]; starts anew if the edit selects another method. `tiles` is the film's new number of tiles.
     fn update(&mut self, edit: &Edited, tiles: usize, limits: &Limits) -> Updated;
     /// See [`Method::is_settling`].
-    fn is_settling(&self, scene: &Scene) -> bool;
+    fn is_settling(&self, scene: &Scene, first: u32) -> bool;
     /// See [`Method::count_anew`].
     fn count_anew(&mut self);
     /// See [`Method::prepare`].
@@ -59,8 +59,8 @@ impl<M: Method> Engine for Driver<M> {
         updated
     }
 
-    fn is_settling(&self, scene: &Scene) -> bool {
-        self.method.is_settling(scene)
+    fn is_settling(&self, scene: &Scene, first: u32) -> bool {
+        self.method.is_settling(scene, first)
     }
 
     fn count_anew(&mut self) {

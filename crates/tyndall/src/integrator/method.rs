@@ -86,9 +86,9 @@ pub trait Method: Sized + Send + Sync + 'static {
         Updated::StartAnew
     }
 
-    /// Whether the first sample of a pixel must wait for [`Self::prepare`].
-    fn is_settling(&self, scene: &Scene) -> bool {
-        let _ = scene;
+    /// Whether the film's first sample, whose number is `first`, must wait for [`Self::prepare`].
+    fn is_settling(&self, scene: &Scene, first: u32) -> bool {
+        let _ = (scene, first);
         false
     }
 

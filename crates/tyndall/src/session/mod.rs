@@ -18,8 +18,8 @@ pub struct Budget {
     pub samples: u32,
     /// Pixels that are to have one sample more.
     pub more: Option<Stride>,
-    /// Most samples to take in this slice, of all pixels together. Where it stops does not depend on threads; a slice takes a turn of at
-    /// least one tile, which is up to 192 samples.
+    /// Most samples to take in this slice, of all pixels together. Where it stops does not depend on threads. A slice takes at least one
+    /// turn of one tile: up to 192 samples in the first pass, up to 256 later.
     pub pixel_samples: Option<u64>,
     /// Time at which to stop; some pixels may then have more samples than others.
     pub deadline: Option<Instant>,
@@ -51,15 +51,15 @@ impl Budget {
 pub struct Progress {
     /// Minimum number of samples per pixel; in a part of a picture, those of the parts before it count.
     pub samples: u32,
-    /// Samples that were taken of all pixels together.
+    /// Samples that were taken of all pixels together; without those of earlier parts.
     pub pixel_samples: u64,
-    /// Samples that were taken per pixel, on average.
+    /// Samples that were taken per pixel, on average; without those of earlier parts.
     pub mean_samples: f64,
     /// Fraction of the pixels that have a sample.
     pub coverage: f64,
     /// Noise of the picture, see [`Film::measured_error`]; `None` for a method without noise.
     pub relative_error: Option<f64>,
-    /// Whether the first samples must wait: kept light has to be asked about an edit, or new light to be prepared. Later samples, which
+    /// Whether the first samples must wait: kept light has to be updated after an edit, or new light to be prepared. Later samples, which
     /// may need more light than the first, do not count.
     pub settling: bool,
 }
@@ -118,9 +118,8 @@ impl Session {
         Self { engine, film, scene, unsettled: None, threads, resources, left, spent }
     }
 
-    /// Continues with an edited scene; returns what the edit changed. Only drops the film, if the edit touched it: kept light is
-    /// asked by the next [`Self::refine`], once for all edits until then. The session then renders the same picture as a
-    /// new one.
+    /// Continues with an edited scene, and returns what changed. This only drops the film, if the edit affects it; the next
+    /// [`Self::refine`] updates kept light, once for all edits made until then. The picture is that of a new session.
     pub fn set_scene(&mut self, scene: Scene) -> Difference {
         let difference = Difference::between(&self.scene, &scene);
         let old = std::mem::replace(&mut self.scene, scene);
@@ -145,8 +144,8 @@ impl Session {
         }
     }
 
-    /// Asks kept light about all edits since the last time, and drops what they affect; the difference between two scenes alone decides
-    /// what that is. False if stopped first.
+    /// Tells the engine of all edits since the last call, as one difference between two scenes; it discards what they affect, now or
+    /// when it next comes across it. False if stopped first.
     fn settle(&mut self, limits: &Limits) -> bool {
         let Self { scene, unsettled, engine, threads, resources, .. } = self;
         let Some(old) = unsettled else { return true };
@@ -249,7 +248,7 @@ impl Session {
             return self.progress();
         }
         let Self { scene, engine, film, threads, spent, .. } = self;
-        let (begin, mut exceeds) = (film.pixel_samples(), true);
+        let (begin, mut may_exceed) = (film.pixel_samples(), true);
         let end = budget.pixel_samples.map(|most| begin.saturating_add(most));
         while !film.has_reached(budget.goal()) && !limits.stop().reached() {
             let left = end.map(|end| end.saturating_sub(film.pixel_samples()));
@@ -270,11 +269,11 @@ impl Session {
             let is_first = so_far == film.first();
             let next = if is_first { film.coarse_goal().unwrap_or(pass) } else { pass };
             let goal = if next.is_beyond(budget.goal()) { budget.goal() } else { next };
-            let Some(tiles) = left.map_or(Some(usize::MAX), |left| film.tiles_within(goal, left, exceeds))
+            let Some(tiles) = left.map_or(Some(usize::MAX), |left| film.tiles_within(goal, left, may_exceed))
             else {
                 break;
             };
-            exceeds = false;
+            may_exceed = false;
             let begun = Instant::now();
             threads.install(|| engine.refine(scene, film, goal, tiles, &limits));
             spent.sampling += begun.elapsed();
@@ -291,7 +290,7 @@ impl Session {
             mean_samples: self.film.mean_samples(),
             coverage: self.film.coverage(),
             relative_error: self.film.measured_error().filter(|_| self.has_noise()),
-            settling: self.unsettled.is_some() || self.engine.is_settling(&self.scene),
+            settling: self.unsettled.is_some() || self.engine.is_settling(&self.scene, self.film.first()),
         }
     }
 

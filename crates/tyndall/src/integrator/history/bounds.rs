@@ -58,24 +58,24 @@ impl Bounds {
 #[derive(Debug)]
 pub(super) struct BoundsInProgress {
     medium: Medium,
-    /// The values in each cell, if it is to be computed too which groups these are in.
+    /// The range of values in each cell; `None` if the groups in each cell are known already.
     values: Option<Arc<Cells>>,
     limits: GroupLimits,
     bounds: Bounds,
-    /// What each piece must be queried for, see [`Moved`]; `None` until it is computed.
-    moved: Vec<Option<Moved>>,
+    /// What each piece must be queried for, see [`MovedBounds`]; `None` until it is computed.
+    moved: Vec<Option<MovedBounds>>,
 }
 
-/// What an edit must query besides the groups whose opacity it changed. For empty cells the changed groups suffice.
+/// The groups to query because a cell's bound moved, besides those whose opacity an edit changed. For empty cells the latter suffice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Moved {
+pub(crate) struct MovedBounds {
     /// The groups that attained the smallest opacity of cells where it falls.
     pub sunk: Historygram,
     /// The groups that attained the majorant of cells where it rises.
     pub raised: Historygram,
 }
 
-impl Moved {
+impl MovedBounds {
     fn with(self, other: Self) -> Self {
         Self { sunk: self.sunk | other.sunk, raised: self.raised | other.raised }
     }
@@ -108,7 +108,7 @@ impl BoundsInProgress {
         cells: &mut [Historygram],
         before: Option<(&Medium, &Bounds)>,
         limits: &Limits,
-    ) -> Option<Moved> {
+    ) -> Option<MovedBounds> {
         let Self { medium, values, limits: of_groups, bounds, moved } = self;
         let (bins, opacities) = (medium.transfer().bins(), medium.majorants().opacities());
         let pieces = (bounds.0.par_chunks_mut(PIECE), cells.par_chunks_mut(PIECE), moved.par_iter_mut());
@@ -117,7 +117,7 @@ impl BoundsInProgress {
                 return;
             }
             let first = piece * PIECE;
-            let mut query = Moved::default();
+            let mut query = MovedBounds::default();
             for (i, (attained, in_cell)) in attained.iter_mut().zip(cells).enumerate() {
                 let (cell, new) = (first + i, opacities[first + i]);
                 if let Some((old_medium, old_bounds)) = before {
@@ -137,7 +137,7 @@ impl BoundsInProgress {
             }
             *moved = Some(query);
         });
-        moved.iter().copied().try_fold(Moved::default(), |all, moved| Some(all.with(moved?)))
+        moved.iter().copied().try_fold(MovedBounds::default(), |all, moved| Some(all.with(moved?)))
     }
 
     /// The bounds, once they are complete.
@@ -150,11 +150,13 @@ impl BoundsInProgress {
 /// a bound.
 #[derive(Debug)]
 struct GroupLimits {
-    /// Ascending, and for each number of them the set of these groups.
+    /// The groups' smallest opacities, ascending.
     least: Vec<f32>,
+    /// Element `n`: the set of the `n` groups with the smallest of these.
     first_least: Vec<Historygram>,
-    /// Ascending, and for each number of them the set of all other groups.
+    /// The groups' largest opacities, ascending.
     most: Vec<f32>,
+    /// Element `n`: the set of all groups but the first `n` of these.
     but_first_most: Vec<Historygram>,
 }
 

@@ -4,7 +4,7 @@ mod bounds;
 mod packed;
 mod touched;
 
-pub(crate) use bounds::Moved;
+pub(crate) use bounds::MovedBounds;
 pub(crate) use packed::PackedHistories;
 pub(crate) use touched::Touched;
 
@@ -76,7 +76,12 @@ impl Reading {
     /// Updates to an edited medium, with the same volume and cells, whose opacity is another in the bins `changed`; returns what
     /// flights must be queried for besides the groups of these bins. `None` if stopped first: the next call must have the same
     /// old medium, and may have another new one.
-    pub fn update(&mut self, [old, new]: [&Medium; 2], changed: &BinSet, limits: &Limits) -> Option<Moved> {
+    pub fn update(
+        &mut self,
+        [old, new]: [&Medium; 2],
+        changed: &BinSet,
+        limits: &Limits,
+    ) -> Option<MovedBounds> {
         let outdated = self.next.as_ref().map_or(!changed.is_empty(), |next| !next.is_of(new));
         if outdated {
             self.next = Some(BoundsInProgress::new(&self.groups, new, self.bounds.is_empty()));
@@ -84,8 +89,8 @@ impl Reading {
         self.go_on(Some(old), limits)
     }
 
-    fn go_on(&mut self, old: Option<&Medium>, limits: &Limits) -> Option<Moved> {
-        let Some(next) = &mut self.next else { return Some(Moved::default()) };
+    fn go_on(&mut self, old: Option<&Medium>, limits: &Limits) -> Option<MovedBounds> {
+        let Some(next) = &mut self.next else { return Some(MovedBounds::default()) };
         let before = old.filter(|_| !self.bounds.is_empty()).map(|old| (old, &self.bounds));
         let moved = next.go_on(&self.groups, &mut self.cells, before, limits)?;
         if let Some(next) = self.next.take() {

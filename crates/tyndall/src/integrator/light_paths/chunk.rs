@@ -23,7 +23,7 @@ pub(crate) struct Chunk<V> {
     /// What has changed since they were traced.
     changed: Past,
     /// Whether the flux of all vertices has changed, and their positions are yet to be marked.
-    reweighed: bool,
+    to_be_marked: bool,
     /// The partial replacement of `traced`, if a stop interrupted retracing.
     underway: Option<Box<Underway<V>>>,
 }
@@ -98,7 +98,7 @@ impl<V: Vertex> Chunk<V> {
     /// A chunk of paths yet to be traced.
     pub fn new(paths: Vec<u32>, groups: u8, histories: HistoryDetail) -> Self {
         let traced = Traced::new(groups, histories == HistoryDetail::Vertices);
-        Self { paths, traced, changed: Past::NOTHING, reweighed: false, underway: None }
+        Self { paths, traced, changed: Past::NOTHING, to_be_marked: false, underway: None }
     }
 
     /// The vertices, path by path.
@@ -129,19 +129,19 @@ impl<V: Vertex> Chunk<V> {
     }
 
     /// Records that an edit changed the flux of all vertices.
-    pub fn reweigh(&mut self) {
-        self.reweighed = true;
+    pub fn must_mark(&mut self) {
+        self.to_be_marked = true;
     }
 
     /// Whether vertices are yet to be marked because of their flux.
-    pub fn is_reweighed(&self) -> bool {
-        self.reweighed
+    pub fn is_to_be_marked(&self) -> bool {
+        self.to_be_marked
     }
 
     /// Marks the positions of all vertices, because of their flux.
     pub fn mark_all(&mut self, marks: &ChangeMarks) {
         marks.mark_all(self.vertices());
-        self.reweighed = false;
+        self.to_be_marked = false;
     }
 
     /// Bytes of the paths themselves, and of their interactions.

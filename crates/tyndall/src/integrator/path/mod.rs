@@ -87,7 +87,7 @@ impl Method for PathTracer {
         Updated::Done
     }
 
-    fn is_settling(&self, _: &Scene) -> bool {
+    fn is_settling(&self, _: &Scene, _: u32) -> bool {
         self.keeper.as_ref().is_some_and(|keeper| !keeper.reading.is_complete())
     }
 

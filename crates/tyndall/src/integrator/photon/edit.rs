@@ -3,7 +3,7 @@
 use super::stored::Photon;
 use super::{PhotonMapper, SegmentTile, marks_for, plan, step};
 use crate::integrator::cells::ChangeMarks;
-use crate::integrator::history::{Moved, Touched};
+use crate::integrator::history::{MovedBounds, Touched};
 use crate::integrator::light_paths::{Chunk, LightPaths, PathSource, sources};
 use crate::integrator::{Edited, Limits, Updated, drop_elsewhere};
 use crate::light::Light;
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 impl PhotonMapper {
-    /// Drops the paths, photons and segments that an edit touched, and nothing else.
+    /// Records what an edit changed, so that exactly the paths, photons and segments that it touched are computed again.
     pub(super) fn keep_valid(
         &mut self,
         edit: &Edited,
@@ -25,7 +25,8 @@ impl PhotonMapper {
         }
         // Light paths do not read a cell's smallest opacity.
         let (media, reading) = ([&*old.medium, &*new.medium], &mut self.ground.reading);
-        let Some(Moved { raised, .. }) = reading.update(media, &difference.transfer.opacity, limits) else {
+        let Some(MovedBounds { raised, .. }) = reading.update(media, &difference.transfer.opacity, limits)
+        else {
             return Updated::Stopped;
         };
         let mut touched = Touched::new(&self.ground.reading.groups, old, new, difference);
@@ -34,8 +35,8 @@ impl PhotonMapper {
             drop_elsewhere(pass);
         }
         // With a different step, segments end at other positions, and the widest slice of a beam changes.
-        let steps = step(old, &self.settings) != step(new, &self.settings);
-        if steps {
+        let step_changed = step(old, &self.settings) != step(new, &self.settings);
+        if step_changed {
             self.marks = marks_for(new, &self.settings);
         } else if tiles.iter().all(|tile| tile.as_ref().is_none_or(SegmentTile::is_settled)) {
             self.marks.clear();
@@ -47,7 +48,7 @@ impl PhotonMapper {
         if difference.density.is_some() {
             self.map.discard();
         }
-        if difference.camera || difference.size || steps {
+        if difference.camera || difference.size || step_changed {
             self.has_segments = false;
         }
         for tile in tiles.iter_mut().flatten() {
@@ -81,7 +82,7 @@ impl PhotonMapper {
             let mut paths = match kept {
                 Some(mut kept) => {
                     if kept.light.as_ref().map(Light::color) != light.as_ref().map(Light::color) {
-                        kept.chunks.iter_mut().for_each(Chunk::reweigh);
+                        kept.chunks.iter_mut().for_each(Chunk::must_mark);
                         self.map.discard();
                     }
                     kept.light = light;
@@ -94,7 +95,7 @@ impl PhotonMapper {
             };
             if paths.count() != plan.count {
                 // Every photon of this light now carries more or less flux.
-                paths.chunks.iter_mut().for_each(Chunk::reweigh);
+                paths.chunks.iter_mut().for_each(Chunk::must_mark);
                 self.map.discard();
                 self.gone.extend(paths.set_count(plan.count));
             }
@@ -108,14 +109,14 @@ impl PhotonMapper {
 
     /// Marks the positions of photons whose flux an edit changed or that are gone, in parallel on the current pool; false if stopped
     /// first.
-    pub(super) fn mark_reweighed(&mut self, limits: &Limits) -> bool {
+    pub(super) fn mark_changed(&mut self, limits: &Limits) -> bool {
         let Self { gone, lights, marks, has_segments, .. } = self;
         let kept = lights.iter_mut().flat_map(|light| &mut light.chunks);
-        let reweighed: Vec<_> = gone.iter_mut().chain(kept).filter(|chunk| chunk.is_reweighed()).collect();
-        let left = AtomicUsize::new(reweighed.len());
+        let to_mark: Vec<_> = gone.iter_mut().chain(kept).filter(|chunk| chunk.is_to_be_marked()).collect();
+        let left = AtomicUsize::new(to_mark.len());
         let off = ChangeMarks::off();
         let marks = if *has_segments { &*marks } else { &off };
-        reweighed.into_par_iter().with_max_len(1).for_each(|chunk| {
+        to_mark.into_par_iter().with_max_len(1).for_each(|chunk| {
             if !limits.stop().reached() {
                 chunk.mark_all(marks);
                 left.fetch_sub(1, Ordering::Relaxed);
@@ -131,6 +132,6 @@ impl PhotonMapper {
 
 /// The chunks of a light that is gone, to be marked.
 fn gone_chunks(mut light: LightPaths<Photon>) -> Vec<Chunk<Photon>> {
-    light.chunks.iter_mut().for_each(Chunk::reweigh);
+    light.chunks.iter_mut().for_each(Chunk::must_mark);
     light.chunks
 }

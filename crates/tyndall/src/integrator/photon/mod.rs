@@ -182,9 +182,10 @@ impl Method for PhotonMapper {
         self.keep_valid(edit, tiles, limits)
     }
 
-    fn is_settling(&self, scene: &Scene) -> bool {
+    fn is_settling(&self, scene: &Scene, first: u32) -> bool {
         let is_lit = || self.map.ready().is_some() && self.lights.iter().all(LightPaths::is_valid);
-        !self.ground.reading.is_complete() || (scene.render.max_scatter > 0 && !is_lit())
+        // A later part of a picture has no base map.
+        !self.ground.reading.is_complete() || (scene.render.max_scatter > 0 && first == 0 && !is_lit())
     }
 
     fn count_anew(&mut self, tiles: &mut [Option<SegmentTile>]) {
@@ -207,7 +208,7 @@ impl Method for PhotonMapper {
             }
             return self.pass.as_mut().is_some_and(|pass| pass.prepare(scene, &self.ground, limits));
         }
-        if !self.mark_reweighed(limits) {
+        if !self.mark_changed(limits) {
             return false;
         }
         let off = ChangeMarks::off();
