@@ -152,7 +152,12 @@ impl MapInProgress {
         }
         let Filling { items, map, filled } = self.filling.as_mut()?;
         map.fill(medium, items, &chunks, filled, limits);
-        if filled.iter().all(|&filled| filled) { self.filling.take().map(|done| done.map) } else { None }
+        if filled.contains(&false) {
+            return None;
+        }
+        let Filling { items, map, .. } = self.filling.take()?;
+        drop_elsewhere(items);
+        Some(map)
     }
 }
 
