@@ -214,6 +214,12 @@ fn a_look_renews_what_changed_and_a_missing_pixel_shows_its_blocks_first() {
     film.clear();
     linear_viewer.look_linear(&film, &mut linear);
     assert!(linear_viewer.changed().is_empty() && film.coverage() == 0.0 && film.samples() == 0);
+    // It is seen to be one also when it has as many samples as the old one had.
+    while !film.tiles[0].has_reached(coarse) {
+        film.tiles[0].add(&grey(7));
+    }
+    linear_viewer.look_linear(&film, &mut linear);
+    assert_eq!(linear_viewer.changed(), [[0, 0]]);
 }
 
 #[test]
