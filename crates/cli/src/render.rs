@@ -8,7 +8,6 @@ use crate::stats::{Stages, peak_memory};
 use crate::{Failure, output, overrides};
 use serde_json::json;
 use std::io::Write;
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -52,6 +51,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     if options.resumable {
         output::check_exr(&paths, "--resumable")?;
     }
+    let stored = options.resume.as_deref().map(StoredRender::open).transpose()?;
 
     overrides::lay_over(&mut input, &options.scene, options.samples)?;
     let on = Options { threads: threads.clone(), level, edits: false };
@@ -83,10 +83,10 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     if limited && options.samples.is_none() {
         samples = u32::MAX;
     }
-    if let (Some(path), Some(info)) = (&options.resume, &info) {
-        resume(&mut live, path, info, samples)?;
+    if let (Some(stored), Some(info)) = (&stored, &info) {
+        resume(&mut live, stored, info, samples)?;
         if live.film().samples() == samples && options.samples.is_none() && !options.run.quiet {
-            let path = path_name(path);
+            let path = path_name(stored.path);
             drop(writeln!(
                 std::io::stderr(),
                 "tyndall: note: {path} already has the {samples} samples asked for; ask for more with --samples"
@@ -154,10 +154,14 @@ fn too_many_parts(part: Share, samples: u32) -> Failure {
     ))
 }
 
-/// Continues with the samples in a file, to a number of `samples`.
-fn resume(live: &mut LiveSession, path: &Path, info: &StateInfo, samples: u32) -> Result<(), Failure> {
-    let stored = StoredRender::open(path)?;
-    let name = path_name(path);
+/// Continues with stored samples, to a number of `samples`.
+fn resume(
+    live: &mut LiveSession,
+    stored: &StoredRender,
+    info: &StateInfo,
+    samples: u32,
+) -> Result<(), Failure> {
+    let name = path_name(stored.path);
     if let Some(part) = stored.info.part {
         return Err(Failure::input(format!(
             "{name}: is part {part} of a render, and a part cannot be resumed; merge all parts first, with --resumable"
