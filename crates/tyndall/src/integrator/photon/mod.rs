@@ -15,6 +15,7 @@ mod kernel;
 mod map;
 mod matter;
 mod pass;
+mod segment;
 mod segments;
 mod settings;
 mod stored;
@@ -73,7 +74,7 @@ impl PhotonMapper {
         let interactions = most_kept(max_scatter) * (2 * photon + 2 * history) as f64;
         let paths = f64::from(settings.photons) * (interactions + (16 + 2 * history) as f64);
         let segments = u64::from(size[0]) * u64::from(size[1]) * u64::from(settings.segments);
-        crate::math::cast::whole(paths).saturating_add(segments.saturating_mul(segments::BYTES + history))
+        crate::math::cast::whole(paths).saturating_add(segments.saturating_mul(segment::BYTES + history))
     }
 
     /// Number of photons of the base map, once traced.
