@@ -109,7 +109,7 @@ fn metadata(
     let mut document = document.clone();
     // A picture that can go on, and a part, keep what the whole is to have.
     if samples.is_none() {
-        document.render.samples = film.samples().max(1);
+        document.render.given_samples = Some(film.samples().max(1));
     }
     let moved = |path: &mut String| *path = relocate(path, from, to);
     document.volume.path.iter_mut().for_each(moved);

@@ -75,7 +75,7 @@ impl StateInfo {
             simd: level.name().to_owned(),
             first: live.film().first(),
             part,
-            samples: live.document().render.samples,
+            samples: live.document().render.samples(),
         }
     }
 

@@ -70,7 +70,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         level.name()
     ));
 
-    let usual_samples = live.document().render.samples;
+    let usual_samples = live.document().render.samples();
     let mut samples = usual_samples;
     if let Some(part) = options.part {
         let range = part.of_samples(samples).ok_or_else(|| too_many_parts(part, samples))?;

@@ -81,7 +81,7 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
     }
     // Also when an edit was bad: the picture before it is not lost.
     if !options.outputs.is_empty() && live.film().samples() > 0 {
-        let samples = live.document().render.samples;
+        let samples = live.document().render.samples();
         run.refine(&mut live, samples);
         output::pictures(&options.outputs, live.film(), live.document(), live.folder(), None)?;
     }
@@ -127,7 +127,7 @@ impl Check {
 /// Applies an edit, and renders until every pixel has a sample of the new scene; `at` says which edit it is.
 fn play(live: &mut LiveSession, edit: &Edit, at: &str, run: &Run) -> Result<Report, Failure> {
     let before = run.verify.then(|| {
-        let samples = live.document().render.samples;
+        let samples = live.document().render.samples();
         run.refine(live, samples);
         Before { samples: live.film().samples(), image: live.image(), kept: live.session().kept_items() }
     });
@@ -160,7 +160,7 @@ fn check(
     let scratch_s = begun.elapsed().as_secs_f64();
 
     // Pictures are equal only at equal sample counts, and a kept picture may have more samples than requested.
-    let samples = live.document().render.samples.max(live.film().samples());
+    let samples = live.document().render.samples().max(live.film().samples());
     run.refine(live, samples);
     run.refine(&mut fresh, samples);
     if run.interrupt.is_requested() {

@@ -9,7 +9,7 @@ use tyndall_formats::memory::available;
 
 /// Refuses a film that would not fit in memory with the samples from number `first` on; `at` begins the message.
 pub(crate) fn film(document: &Document, first: u32, at: &str) -> Result<(), LiveError> {
-    let (size, samples) = (document.film.size, document.render.samples.max(first));
+    let (size, samples) = (document.film.size, document.render.samples().max(first));
     // The film, the picture with its layers, and the encoder's copy of it.
     admit(Film::bytes(size, first, samples) + 2 * Film::bytes(size, 0, 1), |needed, available| {
         LiveError::Memory {

@@ -188,7 +188,7 @@ impl LiveSession {
         let begun = Instant::now();
         let (document, assets) = self.parse(value.clone(), at)?;
         let before = &self.built.document;
-        if document.film.size != before.film.size || document.render.samples != before.render.samples {
+        if document.film.size != before.film.size || document.render.samples() != before.render.samples() {
             admission::film(&document, 0, at)?;
         }
         let more_memory = document.film.size != before.film.size || document.render != before.render;

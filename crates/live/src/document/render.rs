@@ -17,8 +17,8 @@ use super::shape::{Samples, ScatteringOrder};
 pub struct Render {
     /// Keeps light that scattered at most this many times.
     pub max_scatter: u32,
-    /// Samples per pixel at which rendering stops.
-    pub samples: u32,
+    /// Samples per pixel at which rendering stops; `None` for as many as the method usually takes, see [`Self::samples`].
+    pub given_samples: Option<u32>,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Index in [`METHODS`] of the method that is used.
@@ -29,9 +29,9 @@ pub struct Render {
 
 impl Default for Render {
     fn default() -> Self {
-        let Common { integrator, max_scatter, samples, seed } = Common::default();
+        let Common { integrator, max_scatter, samples: given_samples, seed } = Common::default();
         let settings = METHODS.iter().map(MethodEntry::default_settings).collect();
-        Self { max_scatter, samples, seed, method: number_of(&integrator.0).unwrap_or(0), settings }
+        Self { max_scatter, given_samples, seed, method: number_of(&integrator.0).unwrap_or(0), settings }
     }
 }
 
@@ -40,6 +40,12 @@ impl Render {
     #[must_use]
     pub fn method(&self) -> &MethodChoice {
         &self.settings[self.method]
+    }
+
+    /// Samples per pixel at which rendering stops.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.given_samples.unwrap_or(self.entry().usual_samples)
     }
 
     /// The entry of the method that is used in the list of methods.
@@ -74,14 +80,15 @@ impl TryFrom<Map<String, Value>> for Render {
             None => Ok(entry.default_settings()),
         };
         let settings = METHODS.iter().map(read).collect::<Result<_, _>>()?;
-        let Common { integrator, max_scatter, samples, seed } = serde_json::from_value(Value::Object(table))?;
-        Ok(Self { max_scatter, samples, seed, method: number_of(&integrator.0).unwrap_or(0), settings })
+        let Common { integrator, max_scatter, samples: given_samples, seed } =
+            serde_json::from_value(Value::Object(table))?;
+        Ok(Self { max_scatter, given_samples, seed, method: number_of(&integrator.0).unwrap_or(0), settings })
     }
 }
 
 impl From<Render> for Map<String, Value> {
     fn from(render: Render) -> Self {
-        let Render { max_scatter, samples, seed, .. } = render;
+        let Render { max_scatter, given_samples: samples, seed, .. } = render;
         let integrator = MethodName(render.entry().name.to_owned());
         let common = Common { integrator, max_scatter, samples, seed };
         let mut table = match serde_json::to_value(common) {
@@ -113,7 +120,8 @@ struct Common {
 
     /// Samples per pixel at which rendering stops.
     #[schemars(with = "Samples")]
-    samples: u32,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    samples: Option<u32>,
 
     /// Seed of the random numbers: the same seed gives the same picture, bit for bit.
     seed: u64,
@@ -121,7 +129,7 @@ struct Common {
 
 impl Default for Common {
     fn default() -> Self {
-        Self { integrator: MethodName::default(), max_scatter: 64, samples: 64, seed: 0 }
+        Self { integrator: MethodName::default(), max_scatter: 64, samples: None, seed: 0 }
     }
 }
 
@@ -132,6 +140,11 @@ impl JsonSchema for Render {
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let mut schema = Common::json_schema(generator);
+        if let Some(samples) = schema.pointer_mut("/properties/samples/description") {
+            *samples =
+                format!("Samples per pixel at which rendering stops; when omitted, {}.", usual_samples())
+                    .into();
+        }
         for entry in METHODS {
             let mut settings = entry.schema(generator);
             settings
@@ -143,6 +156,14 @@ impl JsonSchema for Render {
         }
         schema
     }
+}
+
+/// The usual number of samples, and the methods that take another.
+fn usual_samples() -> String {
+    let usual = DEFAULT_METHOD.usual_samples;
+    let others = METHODS.iter().filter(|entry| entry.usual_samples != usual);
+    let others = others.map(|entry| format!(", {} for `{}`", entry.usual_samples, entry.name));
+    others.fold(usual.to_string(), |text, other| text + &other)
 }
 
 /// The name of a method.

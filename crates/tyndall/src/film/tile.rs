@@ -178,7 +178,7 @@ impl Tile {
     /// Positions in the film of at most `most` of these.
     pub fn next(&self, goal: Goal, most: usize) -> impl ExactSizeIterator<Item = [u32; 2]> {
         let turn = self.turn(goal);
-        self.positions(turn.start..turn.end.min(turn.start + most))
+        self.positions(turn.start..turn.end.min(turn.start.saturating_add(most)))
     }
 
     /// Positions in the film of pixels, given by their indices in the tile's order.

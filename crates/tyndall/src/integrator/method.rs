@@ -25,6 +25,9 @@ pub trait Method: Sized + Send + Sync + 'static {
     /// Whether samples are random, so that the picture has a noise estimate.
     const HAS_NOISE: bool = true;
 
+    /// Samples per pixel of a document that gives no number.
+    const USUAL_SAMPLES: u32 = 64;
+
     /// Whether light bends where the refractive index changes; if not, a note says that a scene's index is ignored.
     const BENDS_LIGHT: bool = false;
 

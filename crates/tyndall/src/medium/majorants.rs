@@ -280,7 +280,7 @@ mod tests {
         }
         let way = to - from;
         let length = grid.dims.iter().sum::<i32>() as f32 * grid.edge;
-        Track { ray: Ray::new(from, way / way.length().max(1e-3)), length, before: 0.0 }
+        Track { ray: Ray::new(from, way / way.length().max(1e-3)), length, before: 0.0, shift: 0.0 }
     }
 
     #[test]

@@ -7,7 +7,7 @@
 use super::march_notes::MarchNotes;
 use super::skip::Skip;
 use super::{Medium, Track};
-use crate::math::{Ray, cast};
+use crate::math::cast;
 use crate::simd::{Kernel, Lanes, Level, MOST_LANES};
 use fearless_simd::prelude::*;
 
@@ -107,6 +107,8 @@ pub(crate) struct PacketMarch<'a, S: Lanes> {
     whole: S::i32s,
     count: S::i32s,
     rest: S::f32s,
+    /// Where in its step a sample is, as a share of the step's width.
+    within: S::f32s,
     skip: Skip<'a, S>,
     k: S::i32s,
     /// Steps for which every lane stays in cells that hold matter.
@@ -119,19 +121,22 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
     /// With steps of `step` world units.
     #[inline(always)]
     pub fn new(simd: S, medium: &'a Medium, tracks: &[Track; MOST_LANES], step: f32) -> Self {
-        let mut numbers = [[0.0; MOST_LANES]; 7];
+        let mut numbers = [[0.0; MOST_LANES]; 8];
         let mut whole = [0; MOST_LANES];
         let mut count = [0; MOST_LANES];
         for (lane, track) in tracks.iter().enumerate() {
             let steps = Steps::new(track, step);
             let (o, d) = (track.ray.origin, track.ray.direction);
-            for (lanes, x) in numbers.iter_mut().zip([o.x, o.y, o.z, d.x, d.y, d.z, steps.rest]) {
+            for (lanes, x) in
+                numbers.iter_mut().zip([o.x, o.y, o.z, d.x, d.y, d.z, steps.rest, 0.5 + track.shift])
+            {
                 lanes[lane] = x;
             }
             whole[lane] = steps.whole;
             count[lane] = steps.count;
         }
-        let [ox, oy, oz, dx, dy, dz, rest] = &numbers;
+        let [ox, oy, oz, dx, dy, dz, rest, within] = &numbers;
+        let within = load(simd, within);
         let origin = [load(simd, ox), load(simd, oy), load(simd, oz)];
         let direction = [load(simd, dx), load(simd, dy), load(simd, dz)];
         let count = S::i32s::from_slice(simd, &count[..S::WIDTH]);
@@ -145,7 +150,8 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
             whole: S::i32s::from_slice(simd, &whole[..S::WIDTH]),
             count,
             rest: load(simd, rest),
-            skip: Skip::new(simd, medium, origin, direction, step),
+            within,
+            skip: Skip::new(simd, medium, origin, direction, within, step),
             k,
             occupied: 0,
             active: k.simd_lt(count),
@@ -182,7 +188,7 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
         while self.active.any_true() {
             let k = self.k;
             let width = k.simd_lt(self.whole).select(S::f32s::splat(simd, self.width), self.rest);
-            let t = k.to_float::<S::f32s>() * self.width + width * 0.5;
+            let t = k.to_float::<S::f32s>() * self.width + width * self.within;
             let position = at::<S>(self.origin, self.direction, t);
             let mut here = self.active;
             self.k = k + 1;
@@ -241,14 +247,11 @@ impl Track {
         Steps::new(self, step).count
     }
 
-    /// A track as long that begins later by `by`, less than a step, as do its steps.
+    /// The same track, of whose steps a march takes each sample elsewhere than in the middle: by the share `by` of the step's width,
+    /// -1/2 to 1/2, farther on.
     #[must_use]
     pub fn shifted(&self, by: f32) -> Self {
-        Self {
-            ray: Ray::new(self.ray.at(by), self.ray.direction),
-            length: self.length,
-            before: self.before + by,
-        }
+        Self { shift: by, ..*self }
     }
 
     /// The middle of a step.

@@ -71,6 +71,8 @@ pub struct Track {
     length: f32,
     /// World distance before it.
     before: f32,
+    /// World distance from the middle of each step to where a march takes its sample.
+    shift: f32,
 }
 
 impl Track {
@@ -206,12 +208,12 @@ impl Medium {
         let stretch = grid.index_bounds().intersect(&inside).intersect(Interval::up_to(end));
         let stretch = self.clip.cut(&inside, stretch);
         if stretch.is_empty() {
-            return Track { ray: inside, length: 0.0, before: 0.0 };
+            return Track { ray: inside, length: 0.0, before: 0.0, shift: 0.0 };
         }
         let ray = Ray::new(inside.at(stretch.start), inside.direction);
         // From very far away the difference of the two distances is all rounding error.
         let length = (stretch.end - stretch.start).min(self.longest);
-        Track { ray, length, before: stretch.start }
+        Track { ray, length, before: stretch.start, shift: 0.0 }
     }
 
     /// Whether matter may be at an index-space position: inside the box and not cut away.

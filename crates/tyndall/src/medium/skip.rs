@@ -13,6 +13,8 @@ pub(super) struct Skip<'a, S: Lanes> {
     dims: [i32; 3],
     edge: f32,
     step: f32,
+    /// Where in its step a sample is, as a share of the step's width.
+    within: S::f32s,
     origin: [S::f32s; 3],
     inverse: [S::f32s; 3],
     /// Infinite where a track does not advance along the axis, so never leaves a cell there; else 0.
@@ -37,6 +39,7 @@ impl<'a, S: Lanes> Skip<'a, S> {
         medium: &'a Medium,
         origin: [S::f32s; 3],
         direction: [S::f32s; 3],
+        within: S::f32s,
         step: f32,
     ) -> Self {
         let zero = S::f32s::splat(simd, 0.0);
@@ -50,6 +53,7 @@ impl<'a, S: Lanes> Skip<'a, S> {
             dims: medium.majorants.dims(),
             edge: medium.majorants.edge(),
             step,
+            within,
             origin,
             inverse: [u.select(zero, one / x), v.select(zero, one / y), w.select(zero, one / z)],
             never: [u.select(far, zero), v.select(far, zero), w.select(far, zero)],
@@ -74,7 +78,7 @@ impl<'a, S: Lanes> Skip<'a, S> {
         cell.min(S::i32s::splat(self.simd, self.dims[axis] - 1))
     }
 
-    /// The last step whose midpoint is surely in the same empty region or in the same cell with matter; at least the
+    /// The last step whose sample is surely in the same empty region or in the same cell with matter; at least the
     /// next step.
     #[inline(always)]
     pub fn leap(&self, k: S::i32s, cells: &LaneCells<S>) -> S::i32s {
@@ -83,7 +87,7 @@ impl<'a, S: Lanes> Skip<'a, S> {
         let leave =
             self.leave(0, cells, extent).min(self.leave(1, cells, extent)).min(self.leave(2, cells, extent));
         // Past the end of every track, and far from the end of the integers.
-        let last = (leave * (1.0 / self.step) - 0.5).max(0.0).min(1e9);
+        let last = (leave * (1.0 / self.step) - self.within).max(0.0).min(1e9);
         let last: S::i32s = last.to_int();
         last.max(k + 1)
     }

@@ -20,8 +20,12 @@ pub(crate) trait Lanes:
     const WIDTH: usize = <Self::f32s as SimdBase<Self>>::LEN;
 
     /// Gathers single-precision numbers; an index past the end reads the last one.
+    ///
+    /// # Panics
+    /// If there is none.
     #[inline(always)]
     fn numbers(self, table: &[f32], index: Self::u32s) -> Self::f32s {
+        assert!(!table.is_empty(), "no number to read");
         let index = self.at_most(index, table.len() - 1);
         // SAFETY: the index is at most that of the last number, and each number has four bytes.
         let words = unsafe { self.gather_words::<4>(table.as_ptr().cast(), index) };
@@ -30,9 +34,13 @@ pub(crate) trait Lanes:
 
     /// The words that begin at the `index`-th number, where each number has `size` bytes; a word that would reach past
     /// the end is read from the last index where it fits.
+    ///
+    /// # Panics
+    /// If all numbers together are shorter than a word.
     #[inline(always)]
     fn words<T: bytemuck::Pod>(self, numbers: &[T], index: Self::u32s) -> Self::u32s {
         const { assert!(matches!(size_of::<T>(), 1 | 2 | 4)) };
+        assert!(numbers.len() >= 4 / size_of::<T>(), "no word to read");
         let index = self.at_most(index, numbers.len() - 4 / size_of::<T>());
         let base = numbers.as_ptr().cast();
         // SAFETY: after the clamped index there are enough numbers for four bytes.
@@ -127,6 +135,34 @@ mod tests {
             (0..S::WIDTH)
                 .map(|i| (bytes.as_slice()[i], shorts.as_slice()[i], numbers.as_slice()[i]))
                 .collect()
+        }
+    }
+
+    #[test]
+    fn where_there_is_nothing_to_read_it_panics() {
+        struct Numbers;
+        struct Words;
+        impl Kernel for Numbers {
+            type Output = f32;
+
+            #[inline(always)]
+            fn run<S: Lanes>(self, simd: S) -> f32 {
+                simd.numbers(&[], S::u32s::splat(simd, 0)).as_slice()[0]
+            }
+        }
+        impl Kernel for Words {
+            type Output = u32;
+
+            #[inline(always)]
+            fn run<S: Lanes>(self, simd: S) -> u32 {
+                simd.words(&[1_u8, 2, 3], S::u32s::splat(simd, 0)).as_slice()[0]
+            }
+        }
+        for level in Level::available() {
+            let panics =
+                |read: &dyn Fn()| std::panic::catch_unwind(std::panic::AssertUnwindSafe(read)).is_err();
+            assert!(panics(&|| assert_eq!(level.run(Numbers), 0.0)), "{level:?}");
+            assert!(panics(&|| assert_eq!(level.run(Words), 0x30201)), "{level:?}");
         }
     }
 

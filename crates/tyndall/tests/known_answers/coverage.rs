@@ -3,10 +3,11 @@
 use crate::scenes::{Setup, blocks, mean, slab, trace};
 use std::sync::Arc;
 use tyndall::film::PixelSample;
-use tyndall::integrator::Method;
 use tyndall::integrator::path::PathTracer;
 use tyndall::integrator::raymarch::{RayMarch, Settings};
+use tyndall::integrator::{METHODS, Method};
 use tyndall::math::{Ray, Rgb, Vec3};
+use tyndall::medium::ClipShape;
 use tyndall::scattering::Phase;
 use tyndall::scene::{Background, Scene};
 use tyndall::session::{Budget, Session};
@@ -78,5 +79,24 @@ fn a_pixel_is_covered_as_far_as_matter_fills_it() {
     let marched = covered(RayMarch::choose(Settings { step: 0.5, light_samples: 1 }));
     for share in [walked, marched] {
         assert!((share - 0.75).abs() < 2e-3, "{share} of the pixel is covered");
+    }
+}
+
+/// A march that samples each step at a random place must not leave the part of its ray that is kept.
+#[test]
+fn what_is_cut_away_is_in_no_sample() {
+    // Matter fills z < 0, and all that is below z = 0.0125, a twentieth of a voxel, is cut away.
+    let nothing = Optics { opacity: 0.0, ..Optics::default() };
+    let points = vec![Point { value: 0.0, optics: nothing }, Point { value: 1.0, optics: Optics::default() }];
+    let half = blocks([8; 3], [2.0; 3], |p| f32::from(u8::from(p[2] < 4)));
+    let clip = vec![ClipShape::Plane { point: Vec3::Z * 0.0125, normal: -Vec3::Z }];
+    let scene = Setup { clip, max_scatter: 0, ..Setup::new(half, points, 1e4) }.scene();
+    for method in METHODS {
+        let mut scene = scene.clone();
+        scene.render.method = method.default_settings();
+        let threads = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap());
+        let mut session = Session::new(scene, threads);
+        session.refine(&Budget::samples(64));
+        assert_eq!(session.image().rgba[0][3], 0.0, "alpha of `{}`", method.name);
     }
 }

@@ -133,7 +133,7 @@ fn a_scene_as_other_programs_write_it_is_read() {
     }"#;
     let document = Document::from_json(text).unwrap();
     assert_eq!(document.medium.phase, Phase::HenyeyGreenstein { g: 0.6 });
-    assert_eq!(document.render.samples, 256);
+    assert_eq!(document.render.samples(), 256);
 }
 
 #[test]
@@ -176,7 +176,7 @@ fn what_is_left_out_has_its_default() {
         (
             "/render",
             json!({
-                "integrator": "path", "max_scatter": 64, "samples": 64, "seed": 0,
+                "integrator": "path", "max_scatter": 64, "seed": 0,
                 "raymarch": { "step": 0.5, "light_samples": 16 }, "path": { "history_memory": 512 },
                 "photon": {
                     "photons": 1_048_576, "radius": 1.5, "segments": 7, "steps_per_voxel": 2.0, "gather_spacing": 1.5,
@@ -186,6 +186,16 @@ fn what_is_left_out_has_its_default() {
         ),
     ] {
         assert_eq!(value.pointer(path), Some(&default), "{path}");
+    }
+}
+
+#[test]
+fn an_omitted_number_of_samples_follows_the_method() {
+    let samples = |render: Value| scene(&json!({ "render": render })).unwrap().render.samples();
+    for method in tyndall::integrator::METHODS {
+        let usual = if method.has_noise { 64 } else { 4 };
+        assert_eq!(samples(json!({ "integrator": method.name })), usual, "{}", method.name);
+        assert_eq!(samples(json!({ "integrator": method.name, "samples": 9 })), 9, "{}", method.name);
     }
 }
 

@@ -9,6 +9,7 @@ use crate::integrator::{Edited, Limits, Updated, drop_elsewhere};
 use crate::light::Light;
 use crate::scene::Scene;
 use rayon::prelude::*;
+use std::collections::HashMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 impl PhotonMapper {
@@ -66,8 +67,13 @@ impl PhotonMapper {
         let sources = sources(scene);
         let plan = plan(scene, &self.settings, sources.len());
         let mut old: Vec<Option<LightPaths<Photon>>> = self.lights.drain(..).map(Some).collect();
+        // The indices of each stream's lights, the last one first.
+        let mut by_stream: HashMap<u32, Vec<usize>> = HashMap::new();
+        for (i, lit) in old.iter().enumerate().rev() {
+            by_stream.entry(lit.as_ref().map_or(0, |lit| lit.stream)).or_default().push(i);
+        }
         for PathSource { light, stream } in sources {
-            let kept = old.iter_mut().find(|old| old.as_ref().is_some_and(|old| old.stream == stream));
+            let kept = by_stream.get_mut(&stream).and_then(Vec::pop).map(|i| &mut old[i]);
             let same = |old: &LightPaths<Photon>| match (&old.light, &light) {
                 (Some(old), Some(light)) => old.same_paths(light),
                 (None, None) => !glow,

@@ -90,7 +90,7 @@ impl Kernel for GatherPass<'_> {
                 let mut stream = Purpose::ViewRay { pixel, sample }.stream(scene.render.seed);
                 let [in_x, in_y, u, v, within, due] = [(); 6].map(|()| stream.uniform());
                 let ray = scene.camera.ray(scene.size, [x as f32 + in_x, y as f32 + in_y], [u, v]);
-                let track = scene.medium.track(&ray, f32::INFINITY).shifted((within - 0.5) * view.step);
+                let track = scene.medium.track(&ray, f32::INFINITY).shifted(within - 0.5);
                 stretches.rays[lane] = ray;
                 stretches.to[lane] = track.steps(view.step);
                 stretches.tracks[lane] = track;
