@@ -7,6 +7,7 @@ mod block;
 mod bricks;
 mod cells;
 mod grid;
+mod hounsfield;
 mod lanes;
 mod statistics;
 mod value_bins;
@@ -102,6 +103,7 @@ pub struct Volume {
 struct Statistics {
     robust: OnceLock<Histogram>,
     value_bins: OnceLock<Histogram>,
+    is_ct: OnceLock<bool>,
     /// Cells, keyed by their edge.
     cells: Mutex<BTreeMap<usize, Arc<Cells>>>,
 }
@@ -209,6 +211,13 @@ impl Volume {
         self.robust_range
     }
 
+    /// The width of [`Self::robust_range`], at most the largest number of single precision.
+    #[must_use]
+    pub fn robust_width(&self) -> f32 {
+        let [lo, hi] = self.robust_range;
+        cast::single(hi - lo).min(f32::MAX)
+    }
+
     /// Bins over all values that can be read here; over those of the robust range where outliers would leave it too few
     /// bins.
     #[must_use]
@@ -269,6 +278,13 @@ impl Volume {
         /// Fine enough to set a threshold, coarse enough for every bin to mean something.
         const BINS: usize = 256;
         self.statistics.robust.get_or_init(|| self.histogram(self.robust_range, BINS))
+    }
+
+    /// Whether the data are computed tomography in Hounsfield units: they lie in anatomical space and have a peak of air at
+    /// -1000.
+    #[must_use]
+    pub fn is_ct(&self) -> bool {
+        *self.statistics.is_ct.get_or_init(|| hounsfield::is_ct(self))
     }
 
     /// The histogram over the inner [`ValueBins`], all but the outermost two.

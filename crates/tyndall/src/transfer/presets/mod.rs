@@ -64,10 +64,8 @@ impl Preset {
     /// The preset for a volume when none was chosen.
     #[must_use]
     pub fn for_volume(volume: &Volume) -> &'static Self {
-        let [least, most] = volume.value_range();
         let anatomical = volume.grid().space() == Space::Anatomical;
-        // Air at -1000 and something denser than water: Hounsfield units.
-        let name = if least <= -500.0 && most >= 200.0 && least >= -4100.0 {
+        let name = if volume.is_ct() {
             "ct-bone"
         } else if adaptive::is_two_phase(&Profile::new(volume)) {
             "solid"
@@ -138,8 +136,13 @@ mod tests {
         let mut all: Vec<Volume> =
             Kind::ALL.iter().map(|&(kind, _)| Field::new(kind, [20; 3], 1).volume().unwrap()).collect();
         let grid = || Grid::centred([10, 10, 10], [1.0; 3]).unwrap();
-        let hounsfield = (0..1000).map(|i| i * 3 - 1000).collect();
-        all.push(Volume::new(grid(), Voxels::I16(hounsfield), ValueMap::IDENTITY).unwrap());
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let anatomical = Grid::new([10; 3], [1.0; 3], axes, [0.0; 3], Space::Anatomical).unwrap();
+        let hounsfield = (0..1000).map(|i| (i * 4 - 3000).max(-1000)).collect();
+        all.push(Volume::new(anatomical, Voxels::I16(hounsfield), ValueMap::IDENTITY).unwrap());
+        // The same range without air.
+        let seismic = (0..1000).map(|i| i * 3 - 1500).collect();
+        all.push(Volume::new(grid(), Voxels::I16(seismic), ValueMap::IDENTITY).unwrap());
         let sparse = (0..1000).map(|i| if i % 400 == 7 { 1e30 } else { 0.0 }).collect();
         all.push(Volume::new(grid(), Voxels::F32(sparse), ValueMap::IDENTITY).unwrap());
         let flat = Grid::centred([1, 1, 1], [1.0; 3]).unwrap();
@@ -168,6 +171,6 @@ mod tests {
             assert!(function.opacity_range([lo, hi])[1] > 0.2, "{} over [{lo}, {hi}]", preset.name);
         }
         let names = volumes().iter().map(|v| Preset::for_volume(v).name).collect::<Vec<_>>();
-        assert_eq!(names[6], "ct-bone");
+        assert_eq!(names[6..8], ["ct-bone", "cloud"]);
     }
 }
