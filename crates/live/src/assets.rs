@@ -1,5 +1,6 @@
 //! Everything that a scene document refers to: its volume and its environment maps.
 
+use crate::chosen;
 use crate::document::{self, Document};
 use rayon::ThreadPool;
 use std::collections::BTreeMap;
@@ -81,33 +82,42 @@ pub enum AssetError {
     },
 }
 
-/// Loads what a document refers to, in parallel on the current thread pool. Its paths are relative to `folder`.
+/// Loads what a document refers to, in parallel on the current thread pool, and states in the document what it leaves open and the
+/// volume decides. Its paths are relative to `folder`.
 ///
 /// # Errors
 /// [`AssetError`] names the file or key.
-pub fn load(document: &Document, folder: &Path) -> Result<(Assets, Source), AssetError> {
+pub fn load(document: &mut Document, folder: &Path) -> Result<(Assets, Source), AssetError> {
     let (volume, source) = volume(&document.volume, folder)?;
+    chosen::state(document, &volume);
     let volume = Arc::new(volume.with_interpolation(interpolation(document)));
     let maps = maps(document, folder, &BTreeMap::new())?;
     Ok((Assets { volume, maps }, source))
 }
 
-/// Loads the assets of an edited document, in parallel on a thread pool: only what the document before the edit did not
-/// refer to is read; the rest is shared with that document's assets.
+/// As [`load`], for an edited document, in parallel on a thread pool: only what the document before the edit did not refer to is read;
+/// the rest is shared with that document's assets.
 ///
 /// # Errors
 /// [`AssetError`] names the file or key.
 pub fn reload(
-    document: &Document,
+    document: &mut Document,
     folder: &Path,
     before: (&Document, &Assets),
     threads: &ThreadPool,
 ) -> Result<Assets, AssetError> {
     let (old, assets) = before;
-    let interpolation = interpolation(document);
     let same = document::Volume { interpolation: old.volume.interpolation, ..document.volume.clone() };
-    let volume = if same != old.volume {
+    let read = if same == old.volume {
+        chosen::state(document, &assets.volume);
+        None
+    } else {
         let (volume, _) = threads.install(|| volume(&document.volume, folder))?;
+        threads.install(|| chosen::state(document, &volume));
+        Some(volume)
+    };
+    let interpolation = interpolation(document);
+    let volume = if let Some(volume) = read {
         Arc::new(volume.with_interpolation(interpolation))
     } else if assets.volume.interpolation() == interpolation {
         assets.volume.clone()

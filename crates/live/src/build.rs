@@ -232,6 +232,7 @@ fn medium_settings(document: &Document, grid: &Grid) -> Result<MediumSettings, S
         phase,
         brdf,
         gradient_factor: document.medium.gradient_factor,
+        gradient_range: document.medium.gradient_range,
         clip: clip.collect(),
         majorant_cell: document.medium.majorant_cell as usize,
     })
