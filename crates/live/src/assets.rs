@@ -136,8 +136,8 @@ pub fn reload(
 
 fn interpolation(document: &Document) -> Interpolation {
     match document.volume.interpolation {
-        document::Interpolation::Linear => Interpolation::Linear,
-        document::Interpolation::Nearest => Interpolation::Nearest,
+        Some(document::Interpolation::Nearest) => Interpolation::Nearest,
+        Some(document::Interpolation::Linear) | None => Interpolation::Linear,
     }
 }
 

@@ -184,9 +184,9 @@ fn transfer(document: &Document, volume: &Volume) -> Result<TransferFunction, Sc
             let known = PRESETS.map(|p| p.name).join(", ");
             fault("transfer_function.preset", format!("no preset `{}`; known are {known}", excerpt(name)))
         })?;
-        preset.points(volume)
+        preset.points(volume).map_err(|e| fault("transfer_function.preset", e))?
     } else {
-        Preset::for_volume(volume).points(volume)
+        Preset::for_field(volume).points(volume).map_err(|e| fault("transfer_function", e))?
     };
     TransferFunction::over(volume.value_bins(), points).map_err(|e| fault("transfer_function.points", e))
 }

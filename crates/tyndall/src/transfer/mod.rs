@@ -12,7 +12,7 @@ mod table;
 
 pub use difference::{BinSet, TransferDifference};
 pub use historygram::{Grouping, HistoryGroups, Historygram};
-pub use presets::{PRESETS, Preset};
+pub use presets::{PRESETS, Preset, PresetError};
 
 use crate::math::{Rgb, cast};
 use crate::simd::Lanes;

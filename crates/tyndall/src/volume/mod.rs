@@ -8,6 +8,7 @@ mod bricks;
 mod cells;
 mod grid;
 mod hounsfield;
+mod labels;
 mod lanes;
 mod statistics;
 mod value_bins;
@@ -104,6 +105,8 @@ struct Statistics {
     robust: OnceLock<Histogram>,
     value_bins: OnceLock<Histogram>,
     is_ct: OnceLock<bool>,
+    whole_values: OnceLock<Option<Vec<f64>>>,
+    are_labels: OnceLock<bool>,
     /// Cells, keyed by their edge.
     cells: Mutex<BTreeMap<usize, Arc<Cells>>>,
 }
@@ -285,6 +288,30 @@ impl Volume {
     #[must_use]
     pub fn is_ct(&self) -> bool {
         *self.statistics.is_ct.get_or_init(|| hounsfield::is_ct(self))
+    }
+
+    /// The values other than 0, ascending, of data of whole numbers from 0; `None` if there are other numbers, or more than 200 of these.
+    #[must_use]
+    pub fn whole_values(&self) -> Option<&[f64]> {
+        self.statistics.whole_values.get_or_init(|| labels::whole_values(self)).as_deref()
+    }
+
+    /// The labels, ascending, of a segmentation: [`Self::whole_values`], at least two, of parts that most voxels lie inside of.
+    #[must_use]
+    pub fn labels(&self) -> Option<&[f64]> {
+        let values = self.whole_values()?;
+        let are_labels = *self.statistics.are_labels.get_or_init(|| labels::are_labels(self, values));
+        are_labels.then_some(values)
+    }
+
+    /// Folds over all data values, each once, in parallel on the current pool.
+    fn fold_data<A: Send>(
+        &self,
+        start: impl Fn() -> A + Sync + Send,
+        take: impl Fn(&mut A, f64) + Sync + Send,
+        merge: impl Fn(A, A) -> A + Sync + Send,
+    ) -> A {
+        self.bricks.fold(start, |sum, stored| take(sum, self.values.apply(stored)), merge)
     }
 
     /// The histogram over the inner [`ValueBins`], all but the outermost two.
