@@ -41,6 +41,7 @@ fn to_json(loaded: &LoadedScene) -> serde_json::Value {
     let (volume, source) = (&*loaded.assets.volume, &loaded.source);
     let grid = volume.grid();
     let histogram = volume.histogram(volume.value_range(), BINS);
+    let data = |range: [f64; 2]| (!volume.is_empty()).then_some(range);
     json!({
         "dims": grid.dims(),
         "type": volume.type_name(),
@@ -49,13 +50,14 @@ fn to_json(loaded: &LoadedScene) -> serde_json::Value {
         "origin": grid.origin(),
         "bounds": grid.file_bounds(),
         "space": space(volume),
-        "value_range": volume.value_range(),
-        "robust_range": volume.robust_range(),
+        "value_range": data(volume.value_range()),
+        "robust_range": data(volume.robust_range()),
         "gradient_range": loaded.document.medium.gradient_range,
         "histogram": { "range": histogram.range, "counts": histogram.counts },
         "channels": source.channels,
         "times": source.times,
         "non_finite": volume.non_finite(),
+        "no_data": volume.no_data(),
         "preset": Preset::for_volume(volume).name,
         "notes": source.notes,
     })
@@ -109,7 +111,7 @@ fn as_text(loaded: &LoadedScene) -> String {
         let _ = writeln!(text, "gradients  measured against a range of {range}");
     }
     if volume.non_finite() > 0 {
-        let how = "NaN is read as the smallest value, an infinity as the value nearest to it";
+        let how = "NaN is no data, an infinity is read as the value nearest to it";
         let _ = writeln!(text, "not finite {} samples; {how}", volume.non_finite());
     }
     for note in &source.notes {

@@ -174,8 +174,27 @@ fn volume(described: &document::Volume, folder: &Path) -> Result<(Volume, Source
         Some(raw) => read_raw(&path, &layout(raw)),
         None => read(&path),
     }?;
-    let source = Source { channels: loaded.channels, times: loaded.times, notes: loaded.notes };
+    let notes = loaded.notes.into_iter().chain(of_values(&loaded.volume)).collect();
+    let source = Source { channels: loaded.channels, times: loaded.times, notes };
     Ok((loaded.volume, source))
+}
+
+/// What the user should know of a file's values, a sentence each.
+fn of_values(volume: &Volume) -> Vec<String> {
+    if volume.is_empty() {
+        return vec!["every sample is NaN, which is no data: there is nothing to see".to_owned()];
+    }
+    let mut notes = Vec::new();
+    if volume.no_data() > 0 {
+        let count = volume.no_data();
+        notes.push(format!(
+            "{count} samples are NaN, which is no data: nothing is seen up to the samples beside them"
+        ));
+    }
+    if let Some(value) = volume.only_value() {
+        notes.push(format!("every sample is {value}: the volume is background or one solid block"));
+    }
+    notes
 }
 
 fn field(described: &document::Procedural) -> Result<(Volume, Source), AssetError> {

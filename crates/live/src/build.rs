@@ -188,7 +188,7 @@ fn transfer(document: &Document, volume: &Volume) -> Result<TransferFunction, Sc
     } else {
         Preset::for_field(volume).points(volume).map_err(|e| fault("transfer_function", e))?
     };
-    TransferFunction::over(volume.value_bins(), points).map_err(|e| fault("transfer_function.points", e))
+    TransferFunction::for_volume(volume, points).map_err(|e| fault("transfer_function.points", e))
 }
 
 fn point(p: &document::TransferPoint) -> Point {

@@ -27,7 +27,7 @@ use crate::math::{Vec3, cast};
 use bricks::Lattice;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use voxels::with_voxels;
+use voxels::{Mended, with_voxels};
 
 /// How the field is read between voxel centres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,6 +56,11 @@ impl ValueMap {
     #[must_use]
     pub fn apply(self, stored: f64) -> f64 {
         self.slope * stored + self.intercept
+    }
+
+    /// The stored sample of a data value, up to rounding.
+    fn stored(self, value: f64) -> f64 {
+        (value - self.intercept) / self.slope
     }
 }
 
@@ -91,7 +96,7 @@ pub struct Volume {
     interpolation: Interpolation,
     value_range: [f64; 2],
     robust_range: [f64; 2],
-    non_finite: u64,
+    mended: Mended,
     cells: Arc<Cells>,
     statistics: Arc<Statistics>,
     lattice: Lattice,
@@ -129,9 +134,10 @@ impl Volume {
         if !slope.is_finite() || slope == 0.0 || !intercept.is_finite() {
             return Err(VolumeError::ValueMap { slope, intercept });
         }
-        let non_finite = voxels.mend_non_finite(slope);
-        let value_range = statistics::value_range(&voxels, values);
-        let robust_range = statistics::robust_range(&voxels, values, value_range);
+        let mended = voxels.mend_non_finite(values);
+        let filler = mended.gap.map(|gap| gap.filler);
+        let value_range = statistics::value_range(&voxels, values, filler);
+        let robust_range = statistics::robust_range(&voxels, values, filler, value_range);
         let (bricks, ranges) = Bricks::new(grid.dims(), &voxels);
         Ok(Self {
             lattice: bricks.lattice(),
@@ -142,7 +148,7 @@ impl Volume {
             interpolation: Interpolation::Linear,
             value_range,
             robust_range,
-            non_finite,
+            mended,
             statistics: Arc::default(),
             slope: cast::single(slope),
             intercept: cast::single(intercept),
@@ -183,10 +189,14 @@ impl Volume {
         &self.bricks
     }
 
-    /// A copy of the stored samples in the file's order, x fastest.
+    /// A copy of the stored samples in the file's order, x fastest; infinities are the ends of the range.
     #[must_use]
     pub fn voxels(&self) -> Voxels {
-        self.bricks.to_linear()
+        let mut voxels = self.bricks.to_linear();
+        if let Some(filler) = self.filler() {
+            voxels.unmend(filler);
+        }
+        voxels
     }
 
     /// The sample type's short name, see [`Voxels::type_name`].
@@ -201,7 +211,7 @@ impl Volume {
         self.values
     }
 
-    /// Exact smallest and largest data value.
+    /// Exact smallest and largest data value; zeros if there is no data ([`Self::is_empty`]).
     #[must_use]
     pub fn value_range(&self) -> [f64; 2] {
         self.value_range
@@ -239,7 +249,33 @@ impl Volume {
     /// How many samples were NaN or infinite in the file.
     #[must_use]
     pub fn non_finite(&self) -> u64 {
-        self.non_finite
+        self.mended.non_finite
+    }
+
+    /// How many samples were NaN in the file: they are no data, and neither they nor what lies between them and their neighbours is
+    /// visible.
+    #[must_use]
+    pub fn no_data(&self) -> u64 {
+        self.mended.nan
+    }
+
+    /// Whether there is no data at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.mended.nan == self.grid.len() as u64
+    }
+
+    /// The value of all samples with data, if it is the same; `None` without data.
+    #[must_use]
+    pub fn only_value(&self) -> Option<f64> {
+        let [least, most] = self.value_range;
+        (least == most && !self.is_empty()).then_some(least)
+    }
+
+    /// The data value below which nothing that is read is data, if there are samples without data: their opacity is 0.
+    #[must_use]
+    pub fn no_data_below(&self) -> Option<f64> {
+        self.mended.gap.map(|gap| gap.border)
     }
 
     /// Smallest and largest value per cell of [`Cells::EDGE`] voxels.
@@ -269,10 +305,15 @@ impl Volume {
         })
     }
 
-    /// Counts of the data values in equal bins over `range`; values outside count in the end bins.
+    /// Counts of the data values in equal bins over `range`; values outside count in the end bins, no data in none.
     #[must_use]
     pub fn histogram(&self, range: [f64; 2], bins: usize) -> Histogram {
-        Histogram::new(&self.bricks, self.values, range, bins)
+        Histogram::new(&self.bricks, self.values, self.filler(), range, bins)
+    }
+
+    /// The stored sample that stands for no data.
+    fn filler(&self) -> Option<f64> {
+        self.mended.gap.map(|gap| gap.filler)
     }
 
     /// The histogram of the robust range in 256 bins, by which transfer functions find their thresholds.
@@ -311,7 +352,13 @@ impl Volume {
         take: impl Fn(&mut A, f64) + Sync + Send,
         merge: impl Fn(A, A) -> A + Sync + Send,
     ) -> A {
-        self.bricks.fold(start, |sum, stored| take(sum, self.values.apply(stored)), merge)
+        let filler = self.filler();
+        let take = |sum: &mut A, stored: f64| {
+            if filler != Some(stored) {
+                take(sum, self.values.apply(stored));
+            }
+        };
+        self.bricks.fold(start, take, merge)
     }
 
     /// The histogram over the inner [`ValueBins`], all but the outermost two.
@@ -324,16 +371,18 @@ impl Volume {
         })
     }
 
-    /// The data value at a voxel.
+    /// The data value at a voxel; NaN where there is no data.
     ///
     /// # Panics
     /// If the voxel is outside the grid.
     #[must_use]
     pub fn voxel(&self, position: [usize; 3]) -> f64 {
-        self.values.apply(self.bricks.get(position))
+        let stored = self.bricks.get(position);
+        if self.filler() == Some(stored) { f64::NAN } else { self.values.apply(stored) }
     }
 
-    /// The data value at a point of index space, clamped to the edge outside.
+    /// The data value at a point of index space, clamped to the edge outside; a number below [`Self::no_data_below`] where there is no
+    /// data.
     #[inline]
     #[must_use]
     pub fn value(&self, p: Vec3) -> f32 {

@@ -48,7 +48,21 @@ pub(super) fn is_two_phase(profile: &Profile) -> bool {
     share(low) > 0.05 && share(high) > 0.05 && share(low) + share(high) > 0.8
 }
 
-/// Keeps thresholds distinct when the data have a single value.
+/// What a preset shows of data of a single value, which has no threshold: nothing of background, and of anything else its densest
+/// matter, among the points that it would have.
+pub(super) fn of_one_value(points: &[Point], value: f64) -> Point {
+    /// In CT air is -1000, and padding below.
+    const AIR: f64 = -1000.0;
+
+    let densest = points.iter().max_by(|a, b| a.optics.opacity.total_cmp(&b.optics.opacity));
+    let mut optics = densest.map(|point| point.optics).unwrap_or_default();
+    if value == 0.0 || value <= AIR {
+        optics.opacity = 0.0;
+    }
+    Point { value: cast::single(value), optics }
+}
+
+/// Keeps thresholds distinct where single precision would not.
 fn ascending(mut points: Vec<Point>) -> Vec<Point> {
     for i in 1..points.len() {
         let before = points[i - 1].value;
@@ -97,9 +111,6 @@ pub(super) fn cloud(profile: &Profile) -> Vec<Point> {
     let counts = &profile.histogram.counts;
     let mode = (0..counts.len()).max_by_key(|&i| counts[i]).unwrap_or(0) as f64 / counts.len() as f64;
     let floor = if mode < 0.3 { mode + 0.02 } else { 0.0 };
-    if profile.at(1.0) <= profile.at(0.0) {
-        return vec![matter(profile.at(0.0), 0.3, WHITE, 0.0)];
-    }
     ascending(vec![matter(profile.at(floor), 0.0, WHITE, 0.0), matter(profile.at(1.0), 1.0, WHITE, 0.0)])
 }
 

@@ -121,7 +121,9 @@ impl Preset {
         let anatomical = volume.grid().space() == Space::Anatomical;
         let name = if volume.is_ct() {
             "ct-bone"
-        } else if adaptive::is_two_phase(&Profile::new(volume)) {
+        } else if volume.value_range()[0] == volume.value_range()[1]
+            || adaptive::is_two_phase(&Profile::new(volume))
+        {
             "solid"
         } else if anatomical {
             "mri"
@@ -150,7 +152,11 @@ impl Preset {
     pub fn points(&self, volume: &Volume) -> Result<Vec<Point>, PresetError> {
         match self.points {
             Points::Fixed(points) => Ok(points()),
-            Points::Adaptive(points) => Ok(points(&Profile::new(volume))),
+            Points::Adaptive(points) => {
+                let points = points(&Profile::new(volume));
+                let [least, most] = volume.value_range();
+                Ok(if least == most { vec![adaptive::of_one_value(&points, least)] } else { points })
+            }
             Points::Labels => {
                 let values = volume.whole_values().filter(|values| !values.is_empty());
                 Ok(labels::labels(values.ok_or(PresetError::NoLabels)?))
