@@ -19,7 +19,7 @@ pub(crate) use march::{PacketMarch, PacketSample};
 pub(crate) use march_notes::MarchNotes;
 pub use marched_flight::MarchedCollision;
 
-use crate::math::{Interval, Ray, Vec3};
+use crate::math::{Binade, Interval, Ray, Vec3};
 use crate::scattering::{Brdf, Event, Phase, Surface, surface_share};
 use crate::simd::Lanes;
 use crate::transfer::{Optics, TransferFunction};
@@ -263,11 +263,13 @@ impl Medium {
             Surface { albedo: optics.albedo, specular: optics.specular, roughness: optics.roughness };
         let mut event = Event { phase: self.phase, brdf: self.brdf, surface, normal: None, q: 0.0 };
         if optics.surface > 0.0 {
-            let gradient = self.volume.gradient(p);
-            let length = gradient.length();
-            let h = self.volume.grid().voxel_size();
-            event.q = surface_share(optics.surface, self.gradient_factor, length, h, self.gradient_range);
-            event.normal = (event.q > 0.0).then(|| gradient / length);
+            let Some(gradient) = self.volume.gradient_of_any_scale(p) else { return event };
+            let range = Binade::of(self.gradient_range);
+            let length = gradient.length * gradient.scale.over(range);
+            let range = self.gradient_range * range.inverse();
+            let h = self.volume.grid().scaled_voxel_size();
+            event.q = surface_share(optics.surface, self.gradient_factor, length, h, range);
+            event.normal = (event.q > 0.0).then_some(gradient.normal);
         }
         event
     }

@@ -23,7 +23,7 @@ pub use statistics::Histogram;
 pub use value_bins::ValueBins;
 pub use voxels::{Voxel, Voxels};
 
-use crate::math::{Vec3, cast};
+use crate::math::{Binade, Vec3, cast};
 use bricks::Lattice;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -102,6 +102,17 @@ pub struct Volume {
     lattice: Lattice,
     slope: f32,
     intercept: f32,
+}
+
+/// A gradient of the field at any scale of values and voxels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ScaledGradient {
+    /// Its direction, a unit vector.
+    pub normal: Vec3,
+    /// Its length, in values of `scale` per unit of length in which a voxel measures [`Grid::scaled_voxel_size`].
+    pub length: f32,
+    /// The unit of values.
+    pub scale: Binade,
 }
 
 /// Statistics that are computed once, when first needed, and then kept with the samples.
@@ -412,6 +423,20 @@ impl Volume {
             }
         }
         out.iter_mut().for_each(|stored| *stored = self.slope * *stored + self.intercept);
+    }
+
+    /// [`Self::gradient`] in parts that no scale of values or voxels takes out of single precision; `None` where it vanishes.
+    ///
+    /// All scales are powers of two, by which products are exact: the parts have the bits that the whole would have.
+    #[inline]
+    pub(crate) fn gradient_of_any_scale(&self, p: Vec3) -> Option<ScaledGradient> {
+        // Halves, since the difference of two values may be larger than either.
+        let along = |axis: Vec3| 0.5 * self.value(p + axis * 0.5) - 0.5 * self.value(p - axis * 0.5);
+        let slope = Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z));
+        let scale = Binade::of(slope.abs().max_element());
+        let gradient = self.grid.gradient_per_scaled_voxel(slope * scale.inverse());
+        let length = gradient.length();
+        (length > 0.0).then(|| ScaledGradient { normal: gradient / length, length, scale: scale.doubled() })
     }
 
     /// Gradient of the field per world unit, by central differences between points one voxel apart
