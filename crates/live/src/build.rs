@@ -6,7 +6,7 @@ use rayon::ThreadPool;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
-use tyndall::camera::{AutoView, Camera, FitLens, Lens, fit};
+use tyndall::camera::{AutoFront, AutoView, Camera, FitLens, Lens, fit};
 use tyndall::light::{
     Directional, Disk, Emission, Environment, Light, LightSet, PointLight, Rect, SphereLight,
 };
@@ -16,7 +16,7 @@ use tyndall::message::excerpt;
 use tyndall::scattering::{Abc, Brdf, HenyeyGreenstein, Phase, Schlick};
 use tyndall::scene::{Background, RenderSettings, Scene};
 use tyndall::transfer::{Optics, PRESETS, Point, Preset, TransferFunction};
-use tyndall::volume::{Grid, Space, Volume};
+use tyndall::volume::{Grid, Volume};
 
 /// Why no scene can be built from a document and its assets.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -156,7 +156,7 @@ fn lights(
     }
     let lights = match (same_lights, &document.lights) {
         (Some(before), _) => before.scene.lights.lights().to_vec(),
-        (None, None) => default_lights(medium.volume().grid().space()),
+        (None, None) => default_lights(medium.volume().grid()),
         (None, Some(lights)) => {
             let grid = medium.volume().grid();
             let read = |(i, l)| light(l, grid, assets).map_err(|e| fault(format!("lights.{i}"), e));
@@ -170,7 +170,7 @@ fn lights(
 
 fn light_names(document: &Document, volume: &Volume) -> Vec<Option<String>> {
     match &document.lights {
-        None => vec![None; default_lights(volume.grid().space()).len()],
+        None => vec![None; default_lights(volume.grid()).len()],
         Some(lights) => lights.iter().map(|light| light.name().map(str::to_owned)).collect(),
     }
 }
@@ -280,11 +280,8 @@ fn light(light: &document::Light, grid: &Grid, assets: &Assets) -> Result<Light,
 }
 
 /// Lights that bring out shape: a warm, soft sun from the upper left in front, and a cool sky as fill light.
-fn default_lights(space: Space) -> Vec<Light> {
-    let (up, front) = match space {
-        Space::Anatomical => (Vec3::Z, -Vec3::Y),
-        Space::Plain => (Vec3::Y, Vec3::Z),
-    };
+fn default_lights(grid: &Grid) -> Vec<Light> {
+    let AutoFront { front, up, .. } = AutoFront::of(grid);
     let right = up.cross(front);
     let travel = right * 0.7 - up * 0.8 - front * 0.6;
     let sun = Directional::new(travel, Rgb::new(5.0, 4.7, 4.2), 12.0);
@@ -298,7 +295,9 @@ fn camera(document: &Document, volume: &Volume) -> Result<Camera, SceneError> {
     let up = given.up().map(Vec3::from_array);
     let Some(given_position) = given.position() else {
         let auto = given.auto();
-        let usual = AutoView::default_for(grid.space());
+        // Whoever gives an angle gives it from the front of the space.
+        let is_open = auto.azimuth.is_none() && auto.elevation.is_none();
+        let usual = if is_open { AutoFront::of(grid).view } else { AutoView::default_for(grid.space()) };
         let view = AutoView {
             azimuth: auto.azimuth.unwrap_or(usual.azimuth),
             elevation: auto.elevation.unwrap_or(usual.elevation),
