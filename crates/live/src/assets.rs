@@ -191,6 +191,11 @@ fn of_values(volume: &Volume) -> Vec<String> {
             "{count} samples are NaN, which is no data: nothing is seen up to the samples beside them"
         ));
     }
+    if volume.exceeds_single() {
+        let [lo, hi] = volume.value_range();
+        let what = "values are read in single precision, and those that it does not tell apart count as one";
+        notes.push(format!("the data are from {lo} to {hi}: {what}"));
+    }
     if let Some(value) = volume.only_value() {
         notes.push(format!("every sample is {value}: the volume is background or one solid block"));
     }

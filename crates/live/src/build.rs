@@ -177,6 +177,7 @@ fn light_names(document: &Document, volume: &Volume) -> Vec<Option<String>> {
 
 fn transfer(document: &Document, volume: &Volume) -> Result<TransferFunction, SceneError> {
     let given = document.transfer_function.as_ref();
+    told_apart(document, volume)?;
     let points = if let Some(points) = given.and_then(|t| t.points.as_ref()) {
         points.iter().map(point).collect()
     } else if let Some(name) = given.and_then(|t| t.preset.as_ref()) {
@@ -189,6 +190,34 @@ fn transfer(document: &Document, volume: &Volume) -> Result<TransferFunction, Sc
         Preset::for_field(volume).points(volume).map_err(|e| fault("transfer_function", e))?
     };
     TransferFunction::for_volume(volume, points).map_err(|e| fault("transfer_function.points", e))
+}
+
+/// Refuses a function whose values become one in single precision although the data may tell them apart.
+fn told_apart(document: &Document, volume: &Volume) -> Result<(), SceneError> {
+    let refusal = |key: &str, values: &[f64]| {
+        let values = values.iter().map(f64::to_string).collect::<Vec<_>>().join(" and ");
+        let problem = format!(
+            "{values} are one number in single precision, in which volumes are rendered; expected values that can be told apart: \
+             number the data from a smaller number"
+        );
+        fault(key, problem)
+    };
+    let is_one = |values: &[f64]| values.iter().all(|&v| cast::single(v) == cast::single(values[0]));
+    let differ = |values: &[f64]| values.windows(2).all(|pair| pair[0] < pair[1]);
+    let given = document.transfer_function.as_ref();
+    let values: Vec<f64> =
+        given.and_then(|t| t.points.as_ref()).into_iter().flatten().map(|p| p.value).collect();
+    // Two points that become one are a jump, which is what they were to be, unless there may be data between them.
+    let most = if volume.exceeds_single() { 1 } else { 2 };
+    if let Some(i) = values.windows(most + 1).position(|values| is_one(values) && differ(values)) {
+        return Err(refusal(&format!("transfer_function.points.{}.value", i + most), &values[i..=i + most]));
+    }
+    let preset = given.and_then(|t| t.preset.as_deref()).and_then(Preset::named);
+    let labels = volume.whole_values().filter(|_| preset.is_some_and(Preset::shows_labels));
+    match labels.and_then(|labels| labels.windows(2).find(|pair| is_one(pair))) {
+        Some(pair) => Err(refusal("transfer_function.preset", pair)),
+        None => Ok(()),
+    }
 }
 
 fn point(p: &document::TransferPoint) -> Point {

@@ -257,6 +257,31 @@ impl Volume {
         ValueBins::new([(lo - bin).max(f32::MIN), (hi + bin).min(f32::MAX)])
     }
 
+    /// Whether data may have values that single precision, in which they are read, does not tell apart: whole numbers beyond 2^24, or
+    /// numbers in double precision that are close together for their size.
+    #[must_use]
+    pub fn exceeds_single(&self) -> bool {
+        /// The largest whole number up to which single precision holds all.
+        const WHOLE: f64 = 16_777_216.0;
+        /// Steps of single precision across the range, at least, so that data are seen as they are.
+        const STEPS: f64 = 4096.0;
+
+        let [lo, hi] = self.value_range;
+        let most = lo.abs().max(hi.abs());
+        let are_whole = lo.fract() == 0.0 && hi.fract() == 0.0 && self.whole_values().is_some();
+        match self.bricks.samples() {
+            Voxels::U32(_) | Voxels::I32(_) => most > WHOLE,
+            Voxels::F64(_) => {
+                if are_whole {
+                    most > WHOLE
+                } else {
+                    hi > lo && most > (hi - lo) * (WHOLE / STEPS)
+                }
+            }
+            _ => false,
+        }
+    }
+
     /// How many samples were NaN or infinite in the file.
     #[must_use]
     pub fn non_finite(&self) -> u64 {
