@@ -10,7 +10,7 @@ use tyndall::transfer::Preset;
 use tyndall::volume::procedural::MATERIALS;
 use tyndall::volume::{Space, Volume};
 use tyndall_live::document::FieldKind;
-use tyndall_live::{Input, LoadedScene, Options, Source};
+use tyndall_live::{Input, LoadedScene, Options};
 
 /// Bins of the histogram.
 const BINS: usize = 256;
@@ -23,11 +23,10 @@ pub fn run(options: &InfoOptions) -> Result<(), Failure> {
 }
 
 fn tell(loaded: &LoadedScene, as_json: bool) -> Result<(), Failure> {
-    let (volume, source) = (&*loaded.assets.volume, &loaded.source);
     if as_json {
-        return say(&format!("{:#}\n", to_json(volume, source)));
+        return say(&format!("{:#}\n", to_json(loaded)));
     }
-    let mut text = as_text(volume, source);
+    let mut text = as_text(loaded);
     if loaded.document.volume.procedural.as_ref().is_some_and(|p| p.kind == FieldKind::CornellBox) {
         text.push_str("materials\n");
         for material in MATERIALS {
@@ -38,9 +37,11 @@ fn tell(loaded: &LoadedScene, as_json: bool) -> Result<(), Failure> {
     say(&text)
 }
 
-fn to_json(volume: &Volume, source: &Source) -> serde_json::Value {
+fn to_json(loaded: &LoadedScene) -> serde_json::Value {
+    let (volume, source) = (&*loaded.assets.volume, &loaded.source);
     let grid = volume.grid();
     let histogram = volume.histogram(volume.value_range(), BINS);
+    let data = |range: [f64; 2]| (!volume.is_empty()).then_some(range);
     json!({
         "dims": grid.dims(),
         "type": volume.type_name(),
@@ -49,12 +50,14 @@ fn to_json(volume: &Volume, source: &Source) -> serde_json::Value {
         "origin": grid.origin(),
         "bounds": grid.file_bounds(),
         "space": space(volume),
-        "value_range": volume.value_range(),
-        "robust_range": volume.robust_range(),
+        "value_range": data(volume.value_range()),
+        "robust_range": data(volume.robust_range()),
+        "gradient_range": loaded.document.medium.gradient_range,
         "histogram": { "range": histogram.range, "counts": histogram.counts },
         "channels": source.channels,
         "times": source.times,
         "non_finite": volume.non_finite(),
+        "no_data": volume.no_data(),
         "preset": Preset::for_volume(volume).name,
         "notes": source.notes,
     })
@@ -71,7 +74,8 @@ fn space(volume: &Volume) -> &'static str {
     }
 }
 
-fn as_text(volume: &Volume, source: &Source) -> String {
+fn as_text(loaded: &LoadedScene) -> String {
+    let (volume, source) = (&*loaded.assets.volume, &loaded.source);
     let grid = volume.grid();
     let [nx, ny, nz] = grid.dims();
     let [sx, sy, sz] = grid.spacing();
@@ -103,8 +107,11 @@ fn as_text(volume: &Volume, source: &Source) -> String {
         source.times,
         Preset::for_volume(volume).name,
     );
+    if let Some(range) = loaded.document.medium.gradient_range {
+        let _ = writeln!(text, "gradients  measured against a range of {range}");
+    }
     if volume.non_finite() > 0 {
-        let how = "NaN is read as the smallest value, an infinity as the value nearest to it";
+        let how = "NaN is no data, an infinity is read as the value nearest to it";
         let _ = writeln!(text, "not finite {} samples; {how}", volume.non_finite());
     }
     for note in &source.notes {

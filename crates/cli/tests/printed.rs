@@ -16,7 +16,7 @@ const SCENE: &str = "\
 fn a_part_that_is_not_shown_is_noted() {
     let folder = Folder::new();
     let head = "NRRD0004\ntype: uchar\ndimension: 4\nsizes: 2 2 2 3\nencoding: raw\n\n";
-    folder.put("a.nrrd", [head.as_bytes(), &[9; 24]].concat());
+    folder.put("a.nrrd", [head.as_bytes(), &(0..24).collect::<Vec<u8>>()].concat());
     let arguments = ["render", "../a.nrrd", "--size", "8x8", "--samples", "1"];
     let Ended { status, stderr, .. } = folder.run(&arguments);
     assert_eq!(status, Some(0), "{stderr}");
@@ -59,10 +59,9 @@ fn a_first_sample_past_the_time_is_noted() {
     assert!(stderr.contains(note) && stderr.lines().count() == 1, "{stderr}");
 }
 
-/// What `info` reports about samples that are not finite: how many, and that NaN and minus infinity count as the
-/// smallest value, infinity as the largest.
+/// What `info` reports about samples that are not finite: how many, that NaN counts nowhere, and infinities as the ends of the range.
 #[test]
-fn non_finite_samples_are_counted_and_read_as_the_ends_of_the_range() {
+fn nan_is_no_data_and_infinities_are_the_ends_of_the_range() {
     let values = [f64::NAN, 2.0, f64::INFINITY, 3.0, f64::NEG_INFINITY, 4.0, 2.0, 3.5];
     #[expect(clippy::cast_possible_truncation, reason = "short numbers")]
     let single = values.map(|v| (v as f32).to_le_bytes()).concat();
@@ -75,12 +74,13 @@ fn non_finite_samples_are_counted_and_read_as_the_ends_of_the_range() {
         let report = json(&run(&folder, &["info", "../a.nrrd", "--json"]));
         assert_eq!(report["type"], name, "{report}");
         assert_eq!(report["non_finite"], 3, "{report}");
+        assert_eq!(report["no_data"], 1, "{report}");
         assert_eq!(report["value_range"], serde_json::json!([2.0, 4.0]), "{report}");
         let counts: Vec<u64> =
             serde_json::from_value(report["histogram"]["counts"].clone()).expect("numbers");
-        assert_eq!((counts[0], counts[255], counts.iter().sum::<u64>()), (4, 2, 8), "{report}");
+        assert_eq!((counts[0], counts[255], counts.iter().sum::<u64>()), (3, 2, 7), "{report}");
         let text = String::from_utf8(run(&folder, &["info", "../a.nrrd"])).expect("UTF-8");
-        assert!(text.contains("not finite 3 samples; NaN is read as the smallest value"), "{text}");
+        assert!(text.contains("not finite 3 samples; NaN is no data"), "{text}");
         assert!(text.contains("values     2 to 4;"), "{text}");
     }
 }

@@ -1,5 +1,6 @@
 //! Everything that a scene document refers to: its volume and its environment maps.
 
+use crate::chosen;
 use crate::document::{self, Document};
 use rayon::ThreadPool;
 use std::collections::BTreeMap;
@@ -81,33 +82,42 @@ pub enum AssetError {
     },
 }
 
-/// Loads what a document refers to, in parallel on the current thread pool. Its paths are relative to `folder`.
+/// Loads what a document refers to, in parallel on the current thread pool, and states in the document what it leaves open and the
+/// volume decides. Its paths are relative to `folder`.
 ///
 /// # Errors
 /// [`AssetError`] names the file or key.
-pub fn load(document: &Document, folder: &Path) -> Result<(Assets, Source), AssetError> {
+pub fn load(document: &mut Document, folder: &Path) -> Result<(Assets, Source), AssetError> {
     let (volume, source) = volume(&document.volume, folder)?;
+    chosen::state(document, &volume);
     let volume = Arc::new(volume.with_interpolation(interpolation(document)));
     let maps = maps(document, folder, &BTreeMap::new())?;
     Ok((Assets { volume, maps }, source))
 }
 
-/// Loads the assets of an edited document, in parallel on a thread pool: only what the document before the edit did not
-/// refer to is read; the rest is shared with that document's assets.
+/// As [`load`], for an edited document, in parallel on a thread pool: only what the document before the edit did not refer to is read;
+/// the rest is shared with that document's assets.
 ///
 /// # Errors
 /// [`AssetError`] names the file or key.
 pub fn reload(
-    document: &Document,
+    document: &mut Document,
     folder: &Path,
     before: (&Document, &Assets),
     threads: &ThreadPool,
 ) -> Result<Assets, AssetError> {
     let (old, assets) = before;
-    let interpolation = interpolation(document);
     let same = document::Volume { interpolation: old.volume.interpolation, ..document.volume.clone() };
-    let volume = if same != old.volume {
+    let read = if same == old.volume {
+        chosen::state(document, &assets.volume);
+        None
+    } else {
         let (volume, _) = threads.install(|| volume(&document.volume, folder))?;
+        threads.install(|| chosen::state(document, &volume));
+        Some(volume)
+    };
+    let interpolation = interpolation(document);
+    let volume = if let Some(volume) = read {
         Arc::new(volume.with_interpolation(interpolation))
     } else if assets.volume.interpolation() == interpolation {
         assets.volume.clone()
@@ -126,8 +136,8 @@ pub fn reload(
 
 fn interpolation(document: &Document) -> Interpolation {
     match document.volume.interpolation {
-        document::Interpolation::Linear => Interpolation::Linear,
-        document::Interpolation::Nearest => Interpolation::Nearest,
+        Some(document::Interpolation::Nearest) => Interpolation::Nearest,
+        Some(document::Interpolation::Linear) | None => Interpolation::Linear,
     }
 }
 
@@ -164,8 +174,32 @@ fn volume(described: &document::Volume, folder: &Path) -> Result<(Volume, Source
         Some(raw) => read_raw(&path, &layout(raw)),
         None => read(&path),
     }?;
-    let source = Source { channels: loaded.channels, times: loaded.times, notes: loaded.notes };
+    let notes = loaded.notes.into_iter().chain(of_values(&loaded.volume)).collect();
+    let source = Source { channels: loaded.channels, times: loaded.times, notes };
     Ok((loaded.volume, source))
+}
+
+/// What the user should know of a file's values, a sentence each.
+fn of_values(volume: &Volume) -> Vec<String> {
+    if volume.is_empty() {
+        return vec!["every sample is NaN, which is no data: there is nothing to see".to_owned()];
+    }
+    let mut notes = Vec::new();
+    if volume.no_data() > 0 {
+        let count = volume.no_data();
+        notes.push(format!(
+            "{count} samples are NaN, which is no data: nothing is seen up to the samples beside them"
+        ));
+    }
+    if volume.exceeds_single() {
+        let [lo, hi] = volume.value_range();
+        let what = "values are read in single precision, and those that it does not tell apart count as one";
+        notes.push(format!("the data are from {lo} to {hi}: {what}"));
+    }
+    if let Some(value) = volume.only_value() {
+        notes.push(format!("every sample is {value}: the volume is background or one solid block"));
+    }
+    notes
 }
 
 fn field(described: &document::Procedural) -> Result<(Volume, Source), AssetError> {

@@ -6,7 +6,7 @@ use rayon::ThreadPool;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
-use tyndall::camera::{AutoView, Camera, FitLens, Lens, fit};
+use tyndall::camera::{AutoFront, AutoView, Camera, FitLens, Lens, fit};
 use tyndall::light::{
     Directional, Disk, Emission, Environment, Light, LightSet, PointLight, Rect, SphereLight,
 };
@@ -16,7 +16,7 @@ use tyndall::message::excerpt;
 use tyndall::scattering::{Abc, Brdf, HenyeyGreenstein, Phase, Schlick};
 use tyndall::scene::{Background, RenderSettings, Scene};
 use tyndall::transfer::{Optics, PRESETS, Point, Preset, TransferFunction};
-use tyndall::volume::{Grid, Space, Volume};
+use tyndall::volume::{Grid, Volume};
 
 /// Why no scene can be built from a document and its assets.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -156,7 +156,7 @@ fn lights(
     }
     let lights = match (same_lights, &document.lights) {
         (Some(before), _) => before.scene.lights.lights().to_vec(),
-        (None, None) => default_lights(medium.volume().grid().space()),
+        (None, None) => default_lights(medium.volume().grid()),
         (None, Some(lights)) => {
             let grid = medium.volume().grid();
             let read = |(i, l)| light(l, grid, assets).map_err(|e| fault(format!("lights.{i}"), e));
@@ -170,13 +170,14 @@ fn lights(
 
 fn light_names(document: &Document, volume: &Volume) -> Vec<Option<String>> {
     match &document.lights {
-        None => vec![None; default_lights(volume.grid().space()).len()],
+        None => vec![None; default_lights(volume.grid()).len()],
         Some(lights) => lights.iter().map(|light| light.name().map(str::to_owned)).collect(),
     }
 }
 
 fn transfer(document: &Document, volume: &Volume) -> Result<TransferFunction, SceneError> {
     let given = document.transfer_function.as_ref();
+    told_apart(document, volume)?;
     let points = if let Some(points) = given.and_then(|t| t.points.as_ref()) {
         points.iter().map(point).collect()
     } else if let Some(name) = given.and_then(|t| t.preset.as_ref()) {
@@ -184,11 +185,39 @@ fn transfer(document: &Document, volume: &Volume) -> Result<TransferFunction, Sc
             let known = PRESETS.map(|p| p.name).join(", ");
             fault("transfer_function.preset", format!("no preset `{}`; known are {known}", excerpt(name)))
         })?;
-        preset.points(volume)
+        preset.points(volume).map_err(|e| fault("transfer_function.preset", e))?
     } else {
-        Preset::for_volume(volume).points(volume)
+        Preset::for_field(volume).points(volume).map_err(|e| fault("transfer_function", e))?
     };
-    TransferFunction::over(volume.value_bins(), points).map_err(|e| fault("transfer_function.points", e))
+    TransferFunction::for_volume(volume, points).map_err(|e| fault("transfer_function.points", e))
+}
+
+/// Refuses a function whose values become one in single precision although the data may tell them apart.
+fn told_apart(document: &Document, volume: &Volume) -> Result<(), SceneError> {
+    let refusal = |key: &str, values: &[f64]| {
+        let values = values.iter().map(f64::to_string).collect::<Vec<_>>().join(" and ");
+        let problem = format!(
+            "{values} are one number in single precision, in which volumes are rendered; expected values that can be told apart: \
+             number the data from a smaller number"
+        );
+        fault(key, problem)
+    };
+    let is_one = |values: &[f64]| values.iter().all(|&v| cast::single(v) == cast::single(values[0]));
+    let differ = |values: &[f64]| values.windows(2).all(|pair| pair[0] < pair[1]);
+    let given = document.transfer_function.as_ref();
+    let values: Vec<f64> =
+        given.and_then(|t| t.points.as_ref()).into_iter().flatten().map(|p| p.value).collect();
+    // Two points that become one are a jump, which is what they were to be, unless there may be data between them.
+    let most = if volume.exceeds_single() { 1 } else { 2 };
+    if let Some(i) = values.windows(most + 1).position(|values| is_one(values) && differ(values)) {
+        return Err(refusal(&format!("transfer_function.points.{}.value", i + most), &values[i..=i + most]));
+    }
+    let preset = given.and_then(|t| t.preset.as_deref()).and_then(Preset::named);
+    let labels = volume.whole_values().filter(|_| preset.is_some_and(Preset::shows_labels));
+    match labels.and_then(|labels| labels.windows(2).find(|pair| is_one(pair))) {
+        Some(pair) => Err(refusal("transfer_function.preset", pair)),
+        None => Ok(()),
+    }
 }
 
 fn point(p: &document::TransferPoint) -> Point {
@@ -232,6 +261,7 @@ fn medium_settings(document: &Document, grid: &Grid) -> Result<MediumSettings, S
         phase,
         brdf,
         gradient_factor: document.medium.gradient_factor,
+        gradient_range: document.medium.gradient_range,
         clip: clip.collect(),
         majorant_cell: document.medium.majorant_cell as usize,
     })
@@ -279,11 +309,8 @@ fn light(light: &document::Light, grid: &Grid, assets: &Assets) -> Result<Light,
 }
 
 /// Lights that bring out shape: a warm, soft sun from the upper left in front, and a cool sky as fill light.
-fn default_lights(space: Space) -> Vec<Light> {
-    let (up, front) = match space {
-        Space::Anatomical => (Vec3::Z, -Vec3::Y),
-        Space::Plain => (Vec3::Y, Vec3::Z),
-    };
+fn default_lights(grid: &Grid) -> Vec<Light> {
+    let AutoFront { front, up, .. } = AutoFront::of(grid);
     let right = up.cross(front);
     let travel = right * 0.7 - up * 0.8 - front * 0.6;
     let sun = Directional::new(travel, Rgb::new(5.0, 4.7, 4.2), 12.0);
@@ -297,7 +324,9 @@ fn camera(document: &Document, volume: &Volume) -> Result<Camera, SceneError> {
     let up = given.up().map(Vec3::from_array);
     let Some(given_position) = given.position() else {
         let auto = given.auto();
-        let usual = AutoView::default_for(grid.space());
+        // Whoever gives an angle gives it from the front of the space.
+        let is_open = auto.azimuth.is_none() && auto.elevation.is_none();
+        let usual = if is_open { AutoFront::of(grid).view } else { AutoView::default_for(grid.space()) };
         let view = AutoView {
             azimuth: auto.azimuth.unwrap_or(usual.azimuth),
             elevation: auto.elevation.unwrap_or(usual.elevation),

@@ -1,6 +1,7 @@
 //! Input files: a scene document, a picture with one in its metadata, or a bare volume.
 
 use crate::assets::{self, AssetError, Assets, Source};
+use crate::chosen;
 use crate::document::{self, Document, DocumentError};
 use crate::error::LiveError;
 use crate::options::Options;
@@ -19,6 +20,8 @@ pub struct Input {
     pub folder: PathBuf,
     /// Whether the input is a volume without a scene, whose look is then chosen automatically.
     pub bare: bool,
+    /// Whether the input is a picture of a version that did not state against what it measured gradients.
+    pub robust_gradients: bool,
     /// Its name in messages.
     pub name: String,
     /// Notes for the user on how it was read.
@@ -53,6 +56,12 @@ const LARGEST_DOCUMENT: u64 = 256 << 20;
 /// Bytes of memory that a byte of text may take: a million lights took 33 times the size of their text.
 const MEMORY_PER_BYTE: u64 = 40;
 
+/// Extensions of pictures.
+const PICTURES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "exr"];
+
+/// A key that every picture states; those of earlier versions lack it.
+const GRADIENT_RANGE: &str = "/medium/gradient_range";
+
 impl Input {
     /// Opens a file as what its extension says: a scene, a picture with a scene in its metadata, or else a volume.
     ///
@@ -64,11 +73,14 @@ impl Input {
         let (value, bare) = match extension.as_str() {
             "toml" => (in_file(path, document::value_from_toml(&text()?))?, false),
             "json" => (in_file(path, document::value_from_json(&text()?))?, false),
-            "png" | "jpg" | "jpeg" | "tif" | "tiff" | "exr" => (of_picture(path)?, false),
+            picture if PICTURES.contains(&picture) => (of_picture(path)?, false),
             _ => (of_volume(path)?, true),
         };
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let mut input = Self { value, folder, bare, name: path_name(path), notes: Vec::new() };
+        let robust_gradients =
+            PICTURES.contains(&extension.as_str()) && value.pointer(GRADIENT_RANGE).is_none();
+        let mut input =
+            Self { value, folder, bare, robust_gradients, name: path_name(path), notes: Vec::new() };
         input.notes = in_file(path, document::move_old_keys(&mut input.value))?;
         Ok(input)
     }
@@ -76,7 +88,8 @@ impl Input {
     /// A document that is not in a file; its paths are relative to `folder`.
     #[must_use]
     pub fn of_document(value: Value, folder: &Path) -> Self {
-        Self { value, folder: folder.to_owned(), bare: false, name: "scene".to_owned(), notes: Vec::new() }
+        let (folder, name) = (folder.to_owned(), "scene".to_owned());
+        Self { value, folder, bare: false, robust_gradients: false, name, notes: Vec::new() }
     }
 
     /// Applies a merge patch to the document.
@@ -106,15 +119,16 @@ impl Input {
     /// # Errors
     /// [`LiveError`] if the document or one of the files is invalid.
     pub fn load(self, options: &Options) -> Result<LoadedScene, LiveError> {
-        let Self { mut value, folder, bare, name, mut notes } = self;
+        let Self { mut value, folder, bare, robust_gradients, name, mut notes } = self;
         let in_document = |source| LiveError::Document { at: name.clone(), source };
         notes.extend(document::move_old_keys(&mut value).map_err(in_document)?);
         let density_is_free = bare && value.pointer("/medium/density").is_none();
         let kept = if options.edits { value.clone() } else { Value::Null };
         let mut document = Document::from_value(value).map_err(in_document)?;
+        let range_is_free = robust_gradients && document.medium.gradient_range.is_none();
         let (assets, source) = options
             .threads
-            .install(|| assets::load(&document, &folder))
+            .install(|| assets::load(&mut document, &folder))
             .map_err(|error| of_assets(error, &name))?;
         let mut value = kept;
         if density_is_free {
@@ -122,6 +136,14 @@ impl Input {
             if options.edits {
                 // Chosen to suit the volume; stored so that no edit loses it.
                 value = document::apply(&value, &json!({ "medium": { "density": document.medium.density } }));
+            }
+        }
+        if range_is_free {
+            document.medium.gradient_range = chosen::robust_range(&assets.volume);
+            if options.edits
+                && let Some(range) = document.medium.gradient_range
+            {
+                value = document::apply(&value, &json!({ "medium": { "gradient_range": range } }));
             }
         }
         Ok(LoadedScene { document, assets, source, value, folder, name, notes })

@@ -37,6 +37,7 @@
 mod admission;
 pub mod assets;
 mod build;
+mod chosen;
 pub mod document;
 mod error;
 mod identity;

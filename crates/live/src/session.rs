@@ -212,10 +212,10 @@ impl LiveSession {
 
     /// The document of a value, with its assets; those that the current document also has are shared.
     fn parse(&self, value: Value, at: &str) -> Result<(Document, Assets), LiveError> {
-        let document = Document::from_value(value)
+        let mut document = Document::from_value(value)
             .map_err(|source| LiveError::Document { at: at.to_owned(), source })?;
         let before = (&self.built.document, &self.built.assets);
-        let assets = assets::reload(&document, &self.folder, before, &self.options.threads)
+        let assets = assets::reload(&mut document, &self.folder, before, &self.options.threads)
             .map_err(|source| LiveError::Asset { at: at.to_owned(), source: Box::new(source) })?;
         Ok((document, assets))
     }

@@ -25,6 +25,7 @@ fn medium(kind: Kind) -> Medium {
         phase: Phase::Isotropic,
         brdf: Brdf::Lambert,
         gradient_factor: 10.0,
+        gradient_range: None,
         clip: Vec::new(),
         majorant_cell: 8,
     };

@@ -49,9 +49,9 @@ impl Bench {
     pub fn new(value: Value, threads: usize) -> Result<Self, Failure> {
         let threads = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map(Arc::new);
         let threads = threads.map_err(|e| Failure::input(format!("threads: {e}")))?;
-        let document = Document::from_value(value.clone()).map_err(Failure::input)?;
+        let mut document = Document::from_value(value.clone()).map_err(Failure::input)?;
         let (assets, _) =
-            threads.install(|| assets::load(&document, Path::new(""))).map_err(Failure::input)?;
+            threads.install(|| assets::load(&mut document, Path::new(""))).map_err(Failure::input)?;
         Ok(Self { value, assets, threads })
     }
 

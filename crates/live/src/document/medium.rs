@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::shape::{MajorantCell, MeanCosine, NonNegative};
+use super::shape::{MajorantCell, MeanCosine, NonNegative, Positive};
 
 /// Properties of the whole volume: the scale of its extinction, and how it scatters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -20,10 +20,16 @@ pub struct Medium {
     pub brdf: Brdf,
 
     /// How readily a gradient acts as a surface: light scatters from a surface with probability
-    /// `surface * (1 - exp(-gradient_factor * |grad v| * h / range))`, where h is the voxel's edge and range the robust
-    /// data range.
+    /// `surface * (1 - exp(-gradient_factor * |grad v| * h / range))`, where h is the voxel's edge and range is
+    /// `gradient_range`.
     #[schemars(with = "NonNegative")]
     pub gradient_factor: f32,
+
+    /// Range, in data values, that gradients are measured against; when omitted, 2600 HU for CT and the robust range of other
+    /// data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Positive>")]
+    pub gradient_range: Option<f32>,
 
     /// Edge, in voxels, of the cells that each have their own majorant of the extinction; 0 means one majorant for the
     /// whole volume. It changes the speed, never the expected picture.
@@ -38,6 +44,7 @@ impl Default for Medium {
             phase: Phase::default(),
             brdf: Brdf::default(),
             gradient_factor: 10.0,
+            gradient_range: None,
             majorant_cell: 8,
         }
     }

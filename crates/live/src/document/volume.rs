@@ -22,9 +22,9 @@ pub struct Volume {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub procedural: Option<Procedural>,
 
-    /// How the field is interpolated between voxel centres.
-    #[serde(default)]
-    pub interpolation: Interpolation,
+    /// How the field is interpolated between voxel centres; when omitted, nearest for labels and linear for other data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interpolation: Option<Interpolation>,
 
     /// How to read a file without a header; only with `path`.
     #[serde(skip_serializing_if = "Option::is_none")]

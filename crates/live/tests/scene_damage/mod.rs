@@ -23,7 +23,8 @@ pub fn seeds() -> &'static [Value] {
                     { "value": 0.5, "opacity": 0.2, "albedo": 1.0, "emission": 2.0, "surface": 1.0,
                       "specular": 0.5, "roughness": 0.0, "ior": 1.0 } ] },
                 "medium": { "density": 0.7, "phase": { "type": "henyey-greenstein", "g": 0.5 },
-                    "brdf": { "type": "abc", "b": 0.5, "c": 1.5 }, "gradient_factor": 10.0 },
+                    "brdf": { "type": "abc", "b": 0.5, "c": 1.5 }, "gradient_factor": 10.0,
+                    "gradient_range": 1000.0 },
                 "lights": [
                     { "name": "sun", "type": "directional", "direction": [0.0, -1.0, 0.0],
                       "irradiance": [3.0, 2.0, 1.0], "angle": 5.0 },

@@ -1,7 +1,7 @@
 //! A camera placed automatically so that the volume fits into the picture.
 
 use super::{Camera, Lens, upright};
-use crate::math::Vec3;
+use crate::math::{Vec3, cast};
 use crate::volume::{Grid, Space};
 
 /// The viewpoint of an automatic camera.
@@ -24,6 +24,75 @@ impl AutoView {
             Space::Plain => Self { azimuth: 30.0, elevation: 20.0, zoom: 1.0 },
         }
     }
+}
+
+/// Where an automatic camera stands that was left to choose, with its picture's up: what is before it is the front, and lights come from
+/// there too.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AutoFront {
+    /// The view.
+    pub view: AutoView,
+    /// Unit vector from the volume to what counts as its front.
+    pub front: Vec3,
+    /// Unit vector that counts as up, across the front.
+    pub up: Vec3,
+}
+
+impl AutoFront {
+    /// A volume in the shape of a sheet is seen along its thin axis, on which it would otherwise be a line; others as
+    /// [`AutoView::default_for`] says, with the front and up of their space.
+    #[must_use]
+    pub fn of(grid: &Grid) -> Self {
+        let (up, front) = (grid.space().up(), front_of(grid.space()));
+        let Some(across) = thin_axis(grid) else {
+            return Self { view: AutoView::default_for(grid.space()), front, up };
+        };
+        // From the front if the sheet faces it at all, else from the side that is shown usually: images across the body from the feet,
+        // along it from the patient's left, others from above and from the right.
+        let right = up.cross(front);
+        let side = match grid.space() {
+            Space::Anatomical => right - up,
+            Space::Plain => right + up,
+        };
+        let facing = across.dot(front);
+        let facing = if facing.abs() > 0.1 { facing } else { across.dot(side) };
+        let across = if facing < 0.0 { -across } else { across };
+        let elevation = across.dot(up).clamp(-1.0, 1.0).asin().to_degrees();
+        // Straight from above or below, the azimuth turns the picture: 0 keeps the front at its bottom or top.
+        let level = elevation.abs() > 89.9;
+        let azimuth = if level { 0.0 } else { across.dot(right).atan2(across.dot(front)).to_degrees() };
+        let up_in_picture = if level { -front * elevation.signum() } else { up };
+        let up = (up_in_picture - across * up_in_picture.dot(across)).normalize();
+        Self { view: AutoView { azimuth, elevation, zoom: 1.0 }, front: across, up }
+    }
+}
+
+/// The front of a space: the patient's face (LPS), or +z.
+fn front_of(space: Space) -> Vec3 {
+    match space {
+        Space::Anatomical => -Vec3::Y,
+        Space::Plain => Vec3::Z,
+    }
+}
+
+/// The direction, a unit vector, across a volume that is a sheet: of one voxel along one axis alone, or far thinner along it than along
+/// both others.
+fn thin_axis(grid: &Grid) -> Option<Vec3> {
+    /// From this ratio of edges on a volume is a sheet; a stack of a few slices is a body.
+    const THIN: f64 = 16.0;
+
+    let (dims, spacing) = (grid.dims(), grid.spacing());
+    let extents: [f64; 3] = std::array::from_fn(|a| dims[a] as f64 * spacing[a]);
+    let is_thin = |a: usize| {
+        let mut others = [(a + 1) % 3, (a + 2) % 3].into_iter();
+        others.all(|b| {
+            (dims[a] == 1 && dims[b] > 1 && extents[b] > extents[a]) || extents[b] > THIN * extents[a]
+        })
+    };
+    let axis = (0..3).find(|&axis| is_thin(axis))?;
+    // Across the other two, which need not be at right angles to it.
+    let edge = |a: usize| Vec3::from_array(grid.direction().map(|row| cast::single(row[a])));
+    edge((axis + 1) % 3).cross(edge((axis + 2) % 3)).try_normalize()
 }
 
 /// The lens of an automatic camera.
@@ -55,10 +124,7 @@ const MARGIN: f32 = 0.04;
 pub fn fit(grid: &Grid, view: AutoView, up: Option<Vec3>, lens: FitLens, size: [u32; 2]) -> Camera {
     let chosen_up = up;
     let up = grid.space().up();
-    let front = match grid.space() {
-        Space::Anatomical => -Vec3::Y,
-        Space::Plain => Vec3::Z,
-    };
+    let front = front_of(grid.space());
     let right = up.cross(front);
     let (sin_a, cos_a) = view.azimuth.to_radians().sin_cos();
     let (sin_e, cos_e) = view.elevation.to_radians().sin_cos();
@@ -127,6 +193,50 @@ mod tests {
                 });
                 assert!((reach - (1.0 - MARGIN)).abs() < 1e-3, "reach {reach} from {azimuth}, {elevation}");
             }
+        }
+    }
+
+    #[test]
+    fn a_sheet_is_seen_from_its_front_whichever_axis_is_thin() {
+        let turned = {
+            let (s, c) = 0.3_f64.sin_cos();
+            [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+        };
+        let flipped = [[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]];
+        for space in [Space::Plain, Space::Anatomical] {
+            for direction in [IDENTITY, turned, flipped] {
+                for thin in 0..3 {
+                    for [dims, spacing] in [[[128.0; 3], [1.0; 3]], [[64.0; 3], [0.7, 0.9, 0.8]]] {
+                        let mut dims = dims.map(|n| cast::index(cast::single(n)));
+                        dims[thin] = 1;
+                        let grid = Grid::new(dims, spacing, direction, [3.0, -9.0, 400.0], space).unwrap();
+                        let AutoFront { view, front, up } = AutoFront::of(&grid);
+                        let camera = fit(&grid, view, None, PERSPECTIVE, [100, 100]);
+                        let across = Vec3::from_array(direction.map(|row| cast::single(row[thin])));
+                        let cos = camera.view().dot(across).abs();
+                        assert!(cos > 0.9999, "axis {thin} of {direction:?} in {space:?}: {cos}");
+                        assert!((camera.view() + front).length() < 1e-3, "{front} and {}", camera.view());
+                        assert!((camera.frame.v - up).length() < 1e-3, "{up} and {}", camera.frame.v);
+                    }
+                }
+            }
+        }
+        // As radiologists look at slices: from the feet, the front up and the patient's left on the right.
+        let slice = Grid::new([128, 128, 1], [1.0, 1.0, 5.0], IDENTITY, [0.0; 3], Space::Anatomical).unwrap();
+        let camera = fit(&slice, AutoFront::of(&slice).view, None, PERSPECTIVE, [100, 100]);
+        assert!((camera.frame.u - Vec3::X).length() < 1e-3 && (camera.frame.v + Vec3::Y).length() < 1e-3);
+    }
+
+    #[test]
+    fn a_body_is_no_sheet() {
+        for (dims, spacing) in [
+            ([128, 128, 20], [1.0, 1.0, 5.0]),
+            ([1, 1, 1], [1.0; 3]),
+            ([9, 1, 1], [1.0; 3]),
+            ([2, 2, 1], [1.0, 1.0, 3.0]),
+        ] {
+            let grid = Grid::new(dims, spacing, IDENTITY, [0.0; 3], Space::Plain).unwrap();
+            assert_eq!(AutoFront::of(&grid).view, AutoView::default_for(Space::Plain), "{dims:?}");
         }
     }
 

@@ -2,7 +2,7 @@
 
 mod fit;
 
-pub use fit::{AutoView, FitLens, fit};
+pub use fit::{AutoFront, AutoView, FitLens, fit};
 
 use crate::math::{Frame, Ray, Vec3};
 use crate::sampling::warp;

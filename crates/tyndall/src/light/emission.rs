@@ -1,7 +1,7 @@
 //! Glowing matter as a light: its points are sampled by power, so that a small bright spot is found.
 
 use super::{Emitted, LightSample, Target};
-use crate::math::{Bounds, Ray, Rgb, Vec3};
+use crate::math::{Binade, Bounds, Ray, Rgb, Vec3};
 use crate::medium::Medium;
 use crate::sampling::{Choice, Discrete, Stream, warp};
 use crate::volume::Cells;
@@ -17,14 +17,14 @@ const CELL: usize = 4;
 /// what glows between the voxels is found too, and cells that only might glow are seldom sampled.
 const CAUTION: f32 = 0.1;
 
-/// A point of glowing matter, sampled by power.
+/// A point of glowing matter, sampled by power. Lengths are in the unit of [`GlowingCells::unit`].
 struct Glow {
     /// In index space.
     position: Vec3,
     sigma_t: f32,
-    /// Emitted radiance per world unit of length.
+    /// Emitted radiance per unit of length.
     emitted: Rgb,
-    /// Pdf of the position, per unit of world volume.
+    /// Pdf of the position, per unit of volume.
     per_volume: f32,
 }
 
@@ -46,7 +46,10 @@ struct GlowingCells {
     bounds: Vec<Bounds>,
     /// What each emits per unit of length, at density 1.
     emitted: Vec<f32>,
-    /// World volume per unit of index-space volume.
+    /// A unit of length of about a voxel, in world units: the cube of a voxel's size may be beyond single precision. As a power of two
+    /// it rounds nothing.
+    unit: Binade,
+    /// Volume, in this unit, per unit of index-space volume.
     voxel_volume: f32,
 }
 
@@ -68,15 +71,17 @@ impl GlowingCells {
             numbers: cells.iter().map(|c| c.0).collect(),
             bounds: cells.iter().map(|c| c.1).collect(),
             emitted: cells.iter().map(|c| c.2).collect(),
-            voxel_volume: grid.voxel_size().powi(3),
+            unit: Binade::of(grid.voxel_size()),
+            voxel_volume: grid.scaled_voxel_size().powi(3),
             positions,
         }
     }
 
     /// The probability of each, by its power; `None` where nothing glows.
     fn choice(&self, density: f32) -> Option<Discrete> {
+        let unit = f64::from(self.unit.size()).powi(3);
         let power = |(emitted, bounds): (&f32, &Bounds)| {
-            f64::from(emitted * density * self.voxel_volume * bounds.size().element_product())
+            unit * f64::from(emitted * density * self.voxel_volume * bounds.size().element_product())
         };
         Discrete::new(self.emitted.iter().zip(&self.bounds).map(power))
     }
@@ -128,11 +133,12 @@ impl Emission {
         let u = Vec3::new(stream.uniform(), stream.uniform(), stream.uniform());
         let glow = self.glow(medium, choice, u)?;
         let to_light = medium.volume().grid().index_to_world(glow.position) - from;
-        let squared = to_light.length_squared();
+        let unit = self.glowing.unit;
+        let squared = (to_light * unit.inverse()).length_squared();
         if squared == 0.0 {
             return None;
         }
-        let distance = squared.sqrt();
+        let distance = squared.sqrt() * unit.size();
         Some(LightSample {
             direction: to_light / distance,
             distance,
@@ -150,7 +156,8 @@ impl Emission {
         let glow = self.glow(medium, u[2], Vec3::new(u[3], stream.uniform(), stream.uniform()))?;
         let origin = medium.volume().grid().index_to_world(glow.position);
         let ray = Ray::new(origin, warp::sphere([u[0], u[1]]));
-        Some(Emitted { ray, flux: glow.emitted * (4.0 * PI / glow.per_volume) })
+        let unit = self.glowing.unit.size();
+        Some(Emitted { ray, flux: glow.emitted * (4.0 * PI / glow.per_volume) * (unit * unit) })
     }
 
     /// The position `u` in a cell chosen by power, if it glows.
@@ -162,7 +169,7 @@ impl Emission {
             return None;
         }
         let optics = medium.optics(position);
-        let sigma_t = medium.density() * optics.opacity;
+        let sigma_t = medium.density() * optics.opacity * self.glowing.unit.size();
         let emitted = optics.emitted() * sigma_t;
         let per_volume = chance / (b.size().element_product() * self.glowing.voxel_volume);
         (!emitted.is_black()).then_some(Glow { position, sigma_t, emitted, per_volume })
@@ -176,6 +183,7 @@ impl Emission {
         let number = glowing.positions.cell_at(position);
         let Ok(i) = glowing.numbers.binary_search(&number) else { return 0.0 };
         let volume = glowing.bounds[i].size().element_product() * glowing.voxel_volume;
+        let (distance, sigma_t) = (distance * glowing.unit.inverse(), sigma_t * glowing.unit.size());
         self.cells.probability(i) / volume * distance * distance / sigma_t
     }
 }

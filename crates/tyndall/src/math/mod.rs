@@ -1,5 +1,6 @@
 //! Colours, rays, frames and boxes; the vector types are from `glam`.
 
+pub mod binade;
 pub mod bounds;
 pub mod cast;
 pub mod color;
@@ -7,6 +8,7 @@ pub mod direction;
 pub mod frame;
 pub mod ray;
 
+pub use binade::Binade;
 pub use bounds::Bounds;
 pub use color::{LUMINANCE, Rgb};
 pub use direction::PackedDirection;

@@ -19,7 +19,7 @@ pub(crate) use march::{PacketMarch, PacketSample};
 pub(crate) use march_notes::MarchNotes;
 pub use marched_flight::MarchedCollision;
 
-use crate::math::{Interval, Ray, Vec3, cast};
+use crate::math::{Binade, Interval, Ray, Vec3};
 use crate::scattering::{Brdf, Event, Phase, Surface, surface_share};
 use crate::simd::Lanes;
 use crate::transfer::{Optics, TransferFunction};
@@ -38,6 +38,8 @@ pub struct MediumSettings {
     pub brdf: Brdf,
     /// How fast matter becomes a surface as the gradient grows.
     pub gradient_factor: f32,
+    /// The range, in data values, that gradients are measured against; above 0. `None` is the robust range of the data.
+    pub gradient_range: Option<f32>,
     /// What is cut away.
     pub clip: Vec<ClipShape>,
     /// Voxels along the edge of a majorant cell; 0 is one global majorant.
@@ -59,6 +61,7 @@ pub struct Medium {
     phase: Phase,
     brdf: Brdf,
     gradient_factor: f32,
+    gradient_range: f32,
 }
 
 /// A ray inside the medium: in index space, where `t` is still the world distance, from where it
@@ -128,6 +131,7 @@ impl Medium {
             phase: settings.phase,
             brdf: settings.brdf,
             gradient_factor: settings.gradient_factor,
+            gradient_range: settings.gradient_range.unwrap_or_else(|| volume.robust_width()),
             volume,
             transfer,
         }
@@ -185,6 +189,12 @@ impl Medium {
     #[must_use]
     pub fn gradient_factor(&self) -> f32 {
         self.gradient_factor
+    }
+
+    /// The range, in data values, that gradients are measured against; 0 where the data have a single value.
+    #[must_use]
+    pub fn gradient_range(&self) -> f32 {
+        self.gradient_range
     }
 
     /// What is cut away.
@@ -255,13 +265,13 @@ impl Medium {
             Surface { albedo: optics.albedo, specular: optics.specular, roughness: optics.roughness };
         let mut event = Event { phase: self.phase, brdf: self.brdf, surface, normal: None, q: 0.0 };
         if optics.surface > 0.0 {
-            let gradient = self.volume.gradient(p);
-            let length = gradient.length();
-            let [lo, hi] = self.volume.robust_range();
-            let range = cast::single(hi - lo);
-            let h = self.volume.grid().voxel_size();
+            let Some(gradient) = self.volume.gradient_of_any_scale(p) else { return event };
+            let range = Binade::of(self.gradient_range);
+            let length = gradient.length * gradient.scale.over(range);
+            let range = self.gradient_range * range.inverse();
+            let h = self.volume.grid().scaled_voxel_size();
             event.q = surface_share(optics.surface, self.gradient_factor, length, h, range);
-            event.normal = (event.q > 0.0).then(|| gradient / length);
+            event.normal = (event.q > 0.0).then_some(gradient.normal);
         }
         event
     }
@@ -283,6 +293,7 @@ mod tests {
             phase: Phase::Isotropic,
             brdf: Brdf::Lambert,
             gradient_factor: 3.0,
+            gradient_range: None,
             clip: Vec::new(),
             majorant_cell: 8,
         };
@@ -307,6 +318,7 @@ mod tests {
             phase: Phase::Isotropic,
             brdf: Brdf::Lambert,
             gradient_factor: 3.0,
+            gradient_range: None,
             clip: Vec::new(),
             majorant_cell: 8,
         };

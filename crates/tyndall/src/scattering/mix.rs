@@ -11,8 +11,8 @@ use crate::math::{Rgb, Vec3};
 /// Share of surface scattering at a point: `surface (1 - exp(-gradient_factor |grad v| h / range))`.
 ///
 /// `surface` in [0, 1] from the transfer function; `gradient_length` in data values per world unit;
-/// `voxel_size` the cube root of the voxel volume, in world units; `robust_range` in data values.
-/// 0 where the gradient vanishes and where the data have no range.
+/// `voxel_size` the cube root of the voxel volume, in world units; `range`, which the gradient is measured against, in data
+/// values. 0 where the gradient vanishes and where there is no range.
 #[inline]
 #[must_use]
 pub fn surface_share(
@@ -20,12 +20,12 @@ pub fn surface_share(
     gradient_factor: f32,
     gradient_length: f32,
     voxel_size: f32,
-    robust_range: f32,
+    range: f32,
 ) -> f32 {
-    if !(gradient_length > 0.0 && robust_range > 0.0) {
+    if !(gradient_length > 0.0 && range > 0.0) {
         return 0.0;
     }
-    -surface * (-gradient_factor * gradient_length * voxel_size / robust_range).exp_m1()
+    -surface * (-gradient_factor * gradient_length * voxel_size / range).exp_m1()
 }
 
 /// Everything that determines how light scatters at one point.

@@ -67,7 +67,9 @@ impl Difference {
     pub fn between(old: &Scene, new: &Scene) -> Self {
         let (was, is) = (&*old.medium, &*new.medium);
         let reflects = was.transfer().reflects() || is.transfer().reflects();
-        let surfaces = was.brdf() != is.brdf() || was.gradient_factor() != is.gradient_factor();
+        let surfaces = was.brdf() != is.brdf()
+            || was.gradient_factor() != is.gradient_factor()
+            || was.gradient_range() != is.gradient_range();
         Self {
             transfer: TransferDifference::between(was.transfer(), is.transfer()),
             density: (was.density().to_bits() != is.density().to_bits())

@@ -34,6 +34,7 @@ fn scene(method: MethodChoice, density: f32) -> Scene {
         phase: Phase::Isotropic,
         brdf: Brdf::Lambert,
         gradient_factor: 3.0,
+        gradient_range: None,
         clip: Vec::new(),
         majorant_cell: 8,
     };

@@ -12,11 +12,11 @@ mod table;
 
 pub use difference::{BinSet, TransferDifference};
 pub use historygram::{Grouping, HistoryGroups, Historygram};
-pub use presets::{PRESETS, Preset};
+pub use presets::{PRESETS, Preset, PresetError};
 
 use crate::math::{Rgb, cast};
 use crate::simd::Lanes;
-use crate::volume::ValueBins;
+use crate::volume::{ValueBins, Volume};
 use glow::GlowTable;
 use table::OpacityTable;
 
@@ -128,7 +128,28 @@ impl TransferFunction {
         Self::over(bins, points)
     }
 
-    /// With a table over given bins: those of a volume, which no edit of the points changes.
+    /// For the data of a volume: with a table over its bins, which no edit of the points changes, and without opacity where it has no
+    /// data.
+    ///
+    /// # Errors
+    /// [`TransferError`] if there is no point or the values do not ascend.
+    pub fn for_volume(volume: &Volume, points: Vec<Point>) -> Result<Self, TransferError> {
+        let function = Self::over(volume.value_bins(), points)?;
+        match volume.no_data_below() {
+            None => Ok(function),
+            Some(border) => Self::over(function.bins(), function.above(cast::single(border))),
+        }
+    }
+
+    /// The points of the same function from a value on, and without opacity below it.
+    fn above(&self, border: f32) -> Vec<Point> {
+        let optics = self.optics(border);
+        let jump = [Optics { opacity: 0.0, ..optics }, optics].map(|optics| Point { value: border, optics });
+        let rest = self.points.iter().filter(|point| point.value > border);
+        jump.into_iter().chain(rest.copied()).collect()
+    }
+
+    /// With a table over given bins.
     ///
     /// # Errors
     /// [`TransferError`] if there is no point or the values do not ascend.

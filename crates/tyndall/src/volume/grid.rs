@@ -1,6 +1,6 @@
 //! Where the voxels are: dimensions and the map between index space and the world.
 
-use crate::math::{Affine3A, Bounds, DMat3, DVec3, Mat3, Ray, Vec3, cast};
+use crate::math::{Affine3A, Binade, Bounds, DMat3, DVec3, Mat3, Ray, Vec3, cast};
 
 /// Which way is up, and what the axes mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +39,9 @@ pub struct Grid {
     world_to_index: Affine3A,
     gradient_to_world: Mat3,
     voxel_size: f32,
+    /// [`Self::gradient_to_world`] and the voxel size in a unit of length, a power of two, in which a voxel measures about 1.
+    gradient_per_scaled_voxel: Mat3,
+    scaled_voxel_size: f32,
 }
 
 /// Why a grid is invalid.
@@ -106,6 +109,9 @@ impl Grid {
         let inverse = linear.inverse();
         let middle = DVec3::from_array(dims.map(|n| 0.5 * (n as f64 - 1.0)));
         let center = (DVec3::from_array(origin) + linear * middle).to_array();
+        let voxel_size = cast::single(linear.determinant().abs().cbrt());
+        let scale = Binade::of(voxel_size);
+        let gradient_to_world = inverse.transpose().as_mat3();
         let single = |m: DMat3, t: DVec3| Affine3A::from_mat3_translation(m.as_mat3(), t.as_vec3());
         Ok(Self {
             dims,
@@ -116,8 +122,10 @@ impl Grid {
             space,
             index_to_world: single(linear, -(linear * middle)),
             world_to_index: single(inverse, middle),
-            gradient_to_world: inverse.transpose().as_mat3(),
-            voxel_size: cast::single(linear.determinant().abs().cbrt()),
+            gradient_to_world,
+            voxel_size,
+            gradient_per_scaled_voxel: gradient_to_world * scale.size(),
+            scaled_voxel_size: voxel_size * scale.inverse(),
         })
     }
 
@@ -245,6 +253,18 @@ impl Grid {
             self.world_to_index.transform_point3(ray.origin),
             self.world_to_index.transform_vector3(ray.direction),
         )
+    }
+
+    /// The voxel size in a unit of length, a power of two, of about that size: from 1 to 2.
+    #[inline]
+    pub(crate) fn scaled_voxel_size(&self) -> f32 {
+        self.scaled_voxel_size
+    }
+
+    /// A gradient per index unit turned into one per unit of [`Self::scaled_voxel_size`], along the world's axes.
+    #[inline]
+    pub(crate) fn gradient_per_scaled_voxel(&self, g: Vec3) -> Vec3 {
+        self.gradient_per_scaled_voxel * g
     }
 
     /// A gradient per index unit turned into one per world unit (inverse transpose).

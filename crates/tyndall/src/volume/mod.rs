@@ -7,6 +7,8 @@ mod block;
 mod bricks;
 mod cells;
 mod grid;
+mod hounsfield;
+mod labels;
 mod lanes;
 mod statistics;
 mod value_bins;
@@ -21,11 +23,11 @@ pub use statistics::Histogram;
 pub use value_bins::ValueBins;
 pub use voxels::{Voxel, Voxels};
 
-use crate::math::{Vec3, cast};
+use crate::math::{Binade, Vec3, cast};
 use bricks::Lattice;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use voxels::with_voxels;
+use voxels::{Mended, with_voxels};
 
 /// How the field is read between voxel centres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -54,6 +56,11 @@ impl ValueMap {
     #[must_use]
     pub fn apply(self, stored: f64) -> f64 {
         self.slope * stored + self.intercept
+    }
+
+    /// The stored sample of a data value, up to rounding.
+    fn stored(self, value: f64) -> f64 {
+        (value - self.intercept) / self.slope
     }
 }
 
@@ -89,7 +96,7 @@ pub struct Volume {
     interpolation: Interpolation,
     value_range: [f64; 2],
     robust_range: [f64; 2],
-    non_finite: u64,
+    mended: Mended,
     cells: Arc<Cells>,
     statistics: Arc<Statistics>,
     lattice: Lattice,
@@ -97,11 +104,25 @@ pub struct Volume {
     intercept: f32,
 }
 
+/// A gradient of the field at any scale of values and voxels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ScaledGradient {
+    /// Its direction, a unit vector.
+    pub normal: Vec3,
+    /// Its length, in values of `scale` per unit of length in which a voxel measures [`Grid::scaled_voxel_size`].
+    pub length: f32,
+    /// The unit of values.
+    pub scale: Binade,
+}
+
 /// Statistics that are computed once, when first needed, and then kept with the samples.
 #[derive(Debug, Default)]
 struct Statistics {
     robust: OnceLock<Histogram>,
     value_bins: OnceLock<Histogram>,
+    is_ct: OnceLock<bool>,
+    whole_values: OnceLock<Option<Vec<f64>>>,
+    are_labels: OnceLock<bool>,
     /// Cells, keyed by their edge.
     cells: Mutex<BTreeMap<usize, Arc<Cells>>>,
 }
@@ -124,9 +145,10 @@ impl Volume {
         if !slope.is_finite() || slope == 0.0 || !intercept.is_finite() {
             return Err(VolumeError::ValueMap { slope, intercept });
         }
-        let non_finite = voxels.mend_non_finite(slope);
-        let value_range = statistics::value_range(&voxels, values);
-        let robust_range = statistics::robust_range(&voxels, values, value_range);
+        let mended = voxels.mend_non_finite(values);
+        let filler = mended.gap.map(|gap| gap.filler);
+        let value_range = statistics::value_range(&voxels, values, filler);
+        let robust_range = statistics::robust_range(&voxels, values, filler, value_range);
         let (bricks, ranges) = Bricks::new(grid.dims(), &voxels);
         Ok(Self {
             lattice: bricks.lattice(),
@@ -137,7 +159,7 @@ impl Volume {
             interpolation: Interpolation::Linear,
             value_range,
             robust_range,
-            non_finite,
+            mended,
             statistics: Arc::default(),
             slope: cast::single(slope),
             intercept: cast::single(intercept),
@@ -178,10 +200,14 @@ impl Volume {
         &self.bricks
     }
 
-    /// A copy of the stored samples in the file's order, x fastest.
+    /// A copy of the stored samples in the file's order, x fastest; infinities are the ends of the range.
     #[must_use]
     pub fn voxels(&self) -> Voxels {
-        self.bricks.to_linear()
+        let mut voxels = self.bricks.to_linear();
+        if let Some(filler) = self.filler() {
+            voxels.unmend(filler);
+        }
+        voxels
     }
 
     /// The sample type's short name, see [`Voxels::type_name`].
@@ -196,7 +222,7 @@ impl Volume {
         self.values
     }
 
-    /// Exact smallest and largest data value.
+    /// Exact smallest and largest data value; zeros if there is no data ([`Self::is_empty`]).
     #[must_use]
     pub fn value_range(&self) -> [f64; 2] {
         self.value_range
@@ -207,6 +233,13 @@ impl Volume {
     #[must_use]
     pub fn robust_range(&self) -> [f64; 2] {
         self.robust_range
+    }
+
+    /// The width of [`Self::robust_range`], at most the largest number of single precision.
+    #[must_use]
+    pub fn robust_width(&self) -> f32 {
+        let [lo, hi] = self.robust_range;
+        cast::single(hi - lo).min(f32::MAX)
     }
 
     /// Bins over all values that can be read here; over those of the robust range where outliers would leave it too few
@@ -224,10 +257,61 @@ impl Volume {
         ValueBins::new([(lo - bin).max(f32::MIN), (hi + bin).min(f32::MAX)])
     }
 
+    /// Whether data may have values that single precision, in which they are read, does not tell apart: whole numbers beyond 2^24, or
+    /// numbers in double precision that are close together for their size.
+    #[must_use]
+    pub fn exceeds_single(&self) -> bool {
+        /// The largest whole number up to which single precision holds all.
+        const WHOLE: f64 = 16_777_216.0;
+        /// Steps of single precision across the range, at least, so that data are seen as they are.
+        const STEPS: f64 = 4096.0;
+
+        let [lo, hi] = self.value_range;
+        let most = lo.abs().max(hi.abs());
+        let are_whole = lo.fract() == 0.0 && hi.fract() == 0.0 && self.whole_values().is_some();
+        match self.bricks.samples() {
+            Voxels::U32(_) | Voxels::I32(_) => most > WHOLE,
+            Voxels::F64(_) => {
+                if are_whole {
+                    most > WHOLE
+                } else {
+                    hi > lo && most > (hi - lo) * (WHOLE / STEPS)
+                }
+            }
+            _ => false,
+        }
+    }
+
     /// How many samples were NaN or infinite in the file.
     #[must_use]
     pub fn non_finite(&self) -> u64 {
-        self.non_finite
+        self.mended.non_finite
+    }
+
+    /// How many samples were NaN in the file: they are no data, and neither they nor what lies between them and their neighbours is
+    /// visible.
+    #[must_use]
+    pub fn no_data(&self) -> u64 {
+        self.mended.nan
+    }
+
+    /// Whether there is no data at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.mended.nan == self.grid.len() as u64
+    }
+
+    /// The value of all samples with data, if it is the same; `None` without data.
+    #[must_use]
+    pub fn only_value(&self) -> Option<f64> {
+        let [least, most] = self.value_range;
+        (least == most && !self.is_empty()).then_some(least)
+    }
+
+    /// The data value below which nothing that is read is data, if there are samples without data: their opacity is 0.
+    #[must_use]
+    pub fn no_data_below(&self) -> Option<f64> {
+        self.mended.gap.map(|gap| gap.border)
     }
 
     /// Smallest and largest value per cell of [`Cells::EDGE`] voxels.
@@ -257,10 +341,15 @@ impl Volume {
         })
     }
 
-    /// Counts of the data values in equal bins over `range`; values outside count in the end bins.
+    /// Counts of the data values in equal bins over `range`; values outside count in the end bins, no data in none.
     #[must_use]
     pub fn histogram(&self, range: [f64; 2], bins: usize) -> Histogram {
-        Histogram::new(&self.bricks, self.values, range, bins)
+        Histogram::new(&self.bricks, self.values, self.filler(), range, bins)
+    }
+
+    /// The stored sample that stands for no data.
+    fn filler(&self) -> Option<f64> {
+        self.mended.gap.map(|gap| gap.filler)
     }
 
     /// The histogram of the robust range in 256 bins, by which transfer functions find their thresholds.
@@ -269,6 +358,43 @@ impl Volume {
         /// Fine enough to set a threshold, coarse enough for every bin to mean something.
         const BINS: usize = 256;
         self.statistics.robust.get_or_init(|| self.histogram(self.robust_range, BINS))
+    }
+
+    /// Whether the data are computed tomography in Hounsfield units: they lie in anatomical space and have a peak of air at
+    /// -1000.
+    #[must_use]
+    pub fn is_ct(&self) -> bool {
+        *self.statistics.is_ct.get_or_init(|| hounsfield::is_ct(self))
+    }
+
+    /// The values other than 0, ascending, of data of whole numbers from 0; `None` if there are other numbers, or more than 200 of these.
+    #[must_use]
+    pub fn whole_values(&self) -> Option<&[f64]> {
+        self.statistics.whole_values.get_or_init(|| labels::whole_values(self)).as_deref()
+    }
+
+    /// The labels, ascending, of a segmentation: [`Self::whole_values`], at least two, of parts that most voxels lie inside of.
+    #[must_use]
+    pub fn labels(&self) -> Option<&[f64]> {
+        let values = self.whole_values()?;
+        let are_labels = *self.statistics.are_labels.get_or_init(|| labels::are_labels(self, values));
+        are_labels.then_some(values)
+    }
+
+    /// Folds over all data values, each once, in parallel on the current pool.
+    fn fold_data<A: Send>(
+        &self,
+        start: impl Fn() -> A + Sync + Send,
+        take: impl Fn(&mut A, f64) + Sync + Send,
+        merge: impl Fn(A, A) -> A + Sync + Send,
+    ) -> A {
+        let filler = self.filler();
+        let take = |sum: &mut A, stored: f64| {
+            if filler != Some(stored) {
+                take(sum, self.values.apply(stored));
+            }
+        };
+        self.bricks.fold(start, take, merge)
     }
 
     /// The histogram over the inner [`ValueBins`], all but the outermost two.
@@ -281,16 +407,18 @@ impl Volume {
         })
     }
 
-    /// The data value at a voxel.
+    /// The data value at a voxel; NaN where there is no data.
     ///
     /// # Panics
     /// If the voxel is outside the grid.
     #[must_use]
     pub fn voxel(&self, position: [usize; 3]) -> f64 {
-        self.values.apply(self.bricks.get(position))
+        let stored = self.bricks.get(position);
+        if self.filler() == Some(stored) { f64::NAN } else { self.values.apply(stored) }
     }
 
-    /// The data value at a point of index space, clamped to the edge outside.
+    /// The data value at a point of index space, clamped to the edge outside; a number below [`Self::no_data_below`] where there is no
+    /// data.
     #[inline]
     #[must_use]
     pub fn value(&self, p: Vec3) -> f32 {
@@ -320,6 +448,20 @@ impl Volume {
             }
         }
         out.iter_mut().for_each(|stored| *stored = self.slope * *stored + self.intercept);
+    }
+
+    /// [`Self::gradient`] in parts that no scale of values or voxels takes out of single precision; `None` where it vanishes.
+    ///
+    /// All scales are powers of two, by which products are exact: the parts have the bits that the whole would have.
+    #[inline]
+    pub(crate) fn gradient_of_any_scale(&self, p: Vec3) -> Option<ScaledGradient> {
+        // Halves, since the difference of two values may be larger than either.
+        let along = |axis: Vec3| 0.5 * self.value(p + axis * 0.5) - 0.5 * self.value(p - axis * 0.5);
+        let slope = Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z));
+        let scale = Binade::of(slope.abs().max_element());
+        let gradient = self.grid.gradient_per_scaled_voxel(slope * scale.inverse());
+        let length = gradient.length();
+        (length > 0.0).then(|| ScaledGradient { normal: gradient / length, length, scale: scale.doubled() })
     }
 
     /// Gradient of the field per world unit, by central differences between points one voxel apart

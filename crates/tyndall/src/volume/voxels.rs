@@ -1,5 +1,6 @@
 //! The samples themselves, in the file's type.
 
+use super::ValueMap;
 use crate::math::cast;
 
 /// Samples in memory order, x fastest, in one of eight types.
@@ -102,37 +103,95 @@ impl Voxels {
         with_voxels!(self, data => data[index].to_f64())
     }
 
-    /// Replaces NaN, and the infinity with the smaller data value, by the finite sample with the smallest data
-    /// value, and the other infinity by the one with the largest (0 if no sample is finite); returns how many
-    /// were replaced. The sign of `slope` decides which end of the stored samples has the smallest data value.
-    pub(super) fn mend_non_finite(&mut self, slope: f64) -> u64 {
+    /// Replaces each infinity by the nearest finite sample (0 if no sample is finite), and NaN, which is no data, by a number far below
+    /// all data values; `slope` not zero.
+    pub(super) fn mend_non_finite(&mut self, values: ValueMap) -> Mended {
         match self {
-            Self::F32(data) => fix(data, f32::is_finite, f32::INFINITY.copysign(cast::single(slope)), 0.0),
-            Self::F64(data) => fix(data, f64::is_finite, f64::INFINITY.copysign(slope), 0.0),
-            _ => 0,
+            Self::F32(data) => mend(data, values, cast::single),
+            Self::F64(data) => mend(data, values, |x| x),
+            _ => Mended::default(),
+        }
+    }
+
+    /// Puts NaN back where a sample is `filler`.
+    pub(super) fn unmend(&mut self, filler: f64) {
+        match self {
+            Self::F32(data) => {
+                data.iter_mut().filter(|v| f64::from(**v) == filler).for_each(|v| *v = f32::NAN)
+            }
+            Self::F64(data) => data.iter_mut().filter(|v| **v == filler).for_each(|v| *v = f64::NAN),
+            _ => {}
         }
     }
 }
 
-fn fix<T: Voxel>(data: &mut [T], finite: impl Fn(T) -> bool, largest: T, zero: T) -> u64 {
-    let mut bad = 0;
+/// What was replaced among samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Mended {
+    /// Samples that were NaN or infinite.
+    pub non_finite: u64,
+    /// Samples that were NaN.
+    pub nan: u64,
+    /// What stands for NaN.
+    pub gap: Option<Gap>,
+}
+
+/// What stands for NaN among samples: a number so far below all data that what is interpolated between the two is below them too, but
+/// within a four-thousandth of a voxel of the data. So no kernel needs to know of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Gap {
+    /// The stored sample.
+    pub filler: f64,
+    /// A data value above it and below all data, or the smallest of them: nothing below it is data.
+    pub border: f64,
+}
+
+impl Gap {
+    /// Below data from `lo` to `hi`.
+    fn below([lo, hi]: [f64; 2], values: ValueMap) -> Self {
+        /// In ranges of the data: larger numbers would take bits from the data beside them.
+        const DEPTH: f64 = 4096.0;
+        /// In ranges of the data.
+        const MARGIN: f64 = 1.0 / 256.0;
+
+        let unit = [hi - lo, lo.abs(), 1.0].into_iter().find(|&unit| unit > 0.0).unwrap_or(1.0);
+        let deepest = 0.25 * f64::from(f32::MIN);
+        let filler = (lo - DEPTH * unit).max(deepest).min(lo);
+        Self { filler: values.stored(filler), border: (lo - MARGIN * unit).max(0.5 * filler + 0.5 * lo) }
+    }
+}
+
+fn mend<T: Voxel>(data: &mut [T], values: ValueMap, from_f64: impl Fn(f64) -> T) -> Mended {
+    let mut mended = Mended::default();
     let mut range: Option<[T; 2]> = None;
     for &v in data.iter() {
-        if !finite(v) {
-            bad += 1;
+        let x = v.to_f64();
+        if !x.is_finite() {
+            mended.non_finite += 1;
+            mended.nan += u64::from(x.is_nan());
             continue;
         }
         let [lo, hi] = range.unwrap_or([v, v]);
         range = Some([if v < lo { v } else { lo }, if v > hi { v } else { hi }]);
     }
-    if bad > 0 {
-        let [lo, hi] = range.unwrap_or([zero, zero]);
-        let [smallest_value, largest_value] = if largest > zero { [lo, hi] } else { [hi, lo] };
-        for v in data.iter_mut().filter(|v| !finite(**v)) {
-            *v = if *v == largest { largest_value } else { smallest_value };
+    if mended.non_finite == 0 {
+        return mended;
+    }
+    let stored = range.unwrap_or([T::default(); 2]);
+    let ends = stored.map(|v| values.apply(v.to_f64()));
+    let mut gap = Gap::below([ends[0].min(ends[1]), ends[0].max(ends[1])], values);
+    let filler = from_f64(gap.filler);
+    gap.filler = filler.to_f64();
+    for v in data.iter_mut() {
+        let x = v.to_f64();
+        if x.is_nan() {
+            *v = filler;
+        } else if x.is_infinite() {
+            *v = if x > 0.0 { stored[1] } else { stored[0] };
         }
     }
-    bad
+    mended.gap = (mended.nan > 0).then_some(gap);
+    mended
 }
 
 #[cfg(test)]
@@ -140,15 +199,36 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_a_number_becomes_the_smallest_value() {
+    fn what_is_not_a_number_is_below_all_data_and_infinities_are_its_ends() {
         let mut v = Voxels::F32(vec![3.0, f32::NAN, -2.0, f32::INFINITY, f32::NEG_INFINITY]);
-        assert_eq!(v.mend_non_finite(1.0), 3);
-        assert_eq!(v, Voxels::F32(vec![3.0, -2.0, -2.0, 3.0, -2.0]));
+        let mended = v.mend_non_finite(ValueMap::IDENTITY);
+        let Gap { filler, border } = mended.gap.unwrap();
+        assert_eq!((mended.non_finite, mended.nan), (3, 1));
+        assert_eq!(v, Voxels::F32(vec![3.0, cast::single(filler), -2.0, 3.0, -2.0]));
+        assert!(filler < -20_000.0 && -2.1 < border && border < -2.0, "{filler}, {border}");
+        v.unmend(filler);
+        assert!(v.get(1).is_nan() && v.get(2) == -2.0);
+        // With a negative slope the largest stored samples have the smallest data values.
+        let values = ValueMap { slope: -1.0, intercept: 0.0 };
         let mut turned = Voxels::F64(vec![3.0, f64::NAN, -2.0, f64::INFINITY]);
-        assert_eq!(turned.mend_non_finite(-1.0), 2);
-        assert_eq!(turned, Voxels::F64(vec![3.0, 3.0, -2.0, 3.0]));
+        let gap = turned.mend_non_finite(values).gap.unwrap();
+        assert_eq!(turned, Voxels::F64(vec![3.0, gap.filler, -2.0, 3.0]));
+        assert!(values.apply(gap.filler) < gap.border && gap.border < -3.0, "{gap:?}");
+        let mut infinite = Voxels::F64(vec![1.0, f64::INFINITY]);
+        assert_eq!(infinite.mend_non_finite(values), Mended { non_finite: 1, nan: 0, gap: None });
         let mut none = Voxels::F64(vec![f64::NAN]);
-        assert_eq!(none.mend_non_finite(1.0), 1);
-        assert_eq!(none, Voxels::F64(vec![0.0]));
+        assert_eq!(none.mend_non_finite(ValueMap::IDENTITY).nan, 1);
+    }
+
+    #[test]
+    fn gaps_are_below_data_of_any_scale() {
+        for [lo, hi] in
+            [[0.0, 0.0], [1e-30, 2e-30], [-3e30, 1e30], [-3e38, 3e38], [7e5, 7e5], [1e6, 1e6 + 1.0]]
+        {
+            let Gap { filler, border } = Gap::below([lo, hi], ValueMap::IDENTITY);
+            assert!(cast::single(filler).is_finite(), "{filler} below {lo}");
+            assert!(filler <= border && border <= lo, "{filler}, {border}, {lo}");
+            assert!(lo < -8e37 || (filler < border && border < lo), "{filler}, {border}, {lo}");
+        }
     }
 }

@@ -54,6 +54,7 @@ impl Setup {
             phase: self.phase,
             brdf: self.brdf,
             gradient_factor: 10.0,
+            gradient_range: None,
             clip: self.clip,
             majorant_cell: self.majorant_cell,
         };

@@ -25,6 +25,7 @@ density = 1.0
 phase = { type = "isotropic" }
 brdf = { type = "lambert" }
 gradient_factor = 10.0
+gradient_range = 2500.0
 
 [[lights]]
 type = "directional"

@@ -140,6 +140,10 @@ fn more_than_the_random_numbers_can_address_is_refused() {
 fn numbers_outside_their_range_are_refused() {
     refused_values("medium.density", [json!(-0.1), json!(1e39)]);
     refused_values("medium.gradient_factor", [json!(-1)]);
+    refused_values(
+        "medium.gradient_range",
+        [json!(0), json!(-1), json!(1e-60), json!(1e39), json!("robust")],
+    );
     refused_values("camera.fov", [json!(0), json!(180), json!(1e-60)]);
     refused_values("camera.aperture", [json!(-1)]);
     refused_values("camera.focus", [json!(0), json!(-1)]);

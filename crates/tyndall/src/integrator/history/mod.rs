@@ -171,6 +171,7 @@ mod tests {
                 phase: Phase::Isotropic,
                 brdf: Brdf::Lambert,
                 gradient_factor: 3.0,
+                gradient_range: None,
                 clip: Vec::new(),
                 majorant_cell: 1,
             };

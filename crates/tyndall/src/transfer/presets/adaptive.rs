@@ -1,6 +1,6 @@
 //! Presets that find their thresholds in the histogram.
 
-use super::{Profile, matter};
+use super::{Profile, labels, matter};
 use crate::math::cast;
 use crate::transfer::Point;
 
@@ -48,7 +48,21 @@ pub(super) fn is_two_phase(profile: &Profile) -> bool {
     share(low) > 0.05 && share(high) > 0.05 && share(low) + share(high) > 0.8
 }
 
-/// Keeps thresholds distinct when the data have a single value.
+/// What a preset shows of data of a single value, which has no threshold: nothing of background, and of anything else its densest
+/// matter, among the points that it would have.
+pub(super) fn of_one_value(points: &[Point], value: f64) -> Point {
+    /// In CT air is -1000, and padding below.
+    const AIR: f64 = -1000.0;
+
+    let densest = points.iter().max_by(|a, b| a.optics.opacity.total_cmp(&b.optics.opacity));
+    let mut optics = densest.map(|point| point.optics).unwrap_or_default();
+    if value == 0.0 || value <= AIR {
+        optics.opacity = 0.0;
+    }
+    Point { value: cast::single(value), optics }
+}
+
+/// Keeps thresholds distinct where single precision would not.
 fn ascending(mut points: Vec<Point>) -> Vec<Point> {
     for i in 1..points.len() {
         let before = points[i - 1].value;
@@ -80,6 +94,11 @@ pub(super) fn mri_glass(profile: &Profile) -> Vec<Point> {
 }
 
 pub(super) fn solid(profile: &Profile) -> Vec<Point> {
+    if let Some(values) = profile.labels {
+        // Whatever its number, no part is background.
+        let border = cast::single(values[0] - 0.5);
+        return vec![matter(border, 0.0, STONE, 0.7), matter(border, 1.0, STONE, 0.7)];
+    }
     let t = otsu(profile);
     ascending(vec![
         matter(profile.at(t - 0.08), 0.0, STONE, 0.7),
@@ -92,23 +111,23 @@ pub(super) fn cloud(profile: &Profile) -> Vec<Point> {
     let counts = &profile.histogram.counts;
     let mode = (0..counts.len()).max_by_key(|&i| counts[i]).unwrap_or(0) as f64 / counts.len() as f64;
     let floor = if mode < 0.3 { mode + 0.02 } else { 0.0 };
-    if profile.at(1.0) <= profile.at(0.0) {
-        return vec![matter(profile.at(0.0), 0.3, WHITE, 0.0)];
-    }
     ascending(vec![matter(profile.at(floor), 0.0, WHITE, 0.0), matter(profile.at(1.0), 1.0, WHITE, 0.0)])
 }
 
 pub(super) fn layers(profile: &Profile) -> Vec<Point> {
     const COLORS: [[f32; 3]; 4] =
         [[0.35, 0.55, 0.90], [0.40, 0.80, 0.50], [0.95, 0.75, 0.30], [0.92, 0.35, 0.25]];
+    let opacity = |i: usize| (0.06 * 2.5_f32.powi(cast::fit_u32(i).cast_signed())).min(1.0);
+    if let Some(values) = profile.labels {
+        return labels::veils(values, &COLORS, opacity);
+    }
     let t = 0.7 * otsu(profile);
     let layer = |(i, color): (usize, &[f32; 3])| {
         let middle = t + (1.0 - t) * (i as f64 + 0.5) / COLORS.len() as f64;
         let half = (1.0 - t) * 0.06;
-        let opacity = 0.06 * 2.5_f32.powi(cast::fit_u32(i).cast_signed());
         [
             matter(profile.at(middle - half), 0.0, *color, 0.6),
-            matter(profile.at(middle), opacity.min(1.0), *color, 0.6),
+            matter(profile.at(middle), opacity(i), *color, 0.6),
             matter(profile.at(middle + half), 0.0, *color, 0.6),
         ]
     };
@@ -125,7 +144,7 @@ mod tests {
         let hump = |i: i32, at: i32, n: f64| n * (-f64::from((i - at).pow(2)) / 200.0).exp();
         let count = |i| cast::index(cast::single(hump(i, 20, 9e5) + hump(i, 150, 1e5))) as u64;
         let counts = (0..256).map(count).collect();
-        let profile = Profile { histogram: &Histogram { range: [0.0, 1.0], counts } };
+        let profile = Profile { histogram: &Histogram { range: [0.0, 1.0], counts }, labels: None };
         let t = otsu(&profile);
         assert!((0.2..0.5).contains(&t), "{t}");
         assert!(!is_two_phase(&profile));
@@ -135,7 +154,7 @@ mod tests {
     fn two_values_are_separated_in_the_middle() {
         let mut counts = vec![0; 256];
         (counts[0], counts[255]) = (500, 500);
-        let profile = Profile { histogram: &Histogram { range: [0.0, 1.0], counts } };
+        let profile = Profile { histogram: &Histogram { range: [0.0, 1.0], counts }, labels: None };
         assert!((otsu(&profile) - 0.5).abs() < 0.01);
         assert!(is_two_phase(&profile));
     }
