@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use tyndall::film::{Film, Image};
-use tyndall_formats::image::{Display, Metadata, Picture, encode_png, write};
+use tyndall_formats::image::{Metadata, Picture, encode_png, write};
 use tyndall_live::document::{Background, Document, Light};
 
 /// The name of standard output.
@@ -76,8 +76,7 @@ pub fn pictures(
         transparent: document.film.background == Background::Transparent,
         state: Vec::new(),
     };
-    let tone = document.film.tone.curve();
-    let display = Display { tone, exposure: document.film.exposure };
+    let tone = document.film.shown();
     for path in paths {
         let to_stdout = path.as_os_str() == STDOUT;
         let folder = if to_stdout { Path::new("") } else { path.parent().unwrap_or(Path::new("")) };
@@ -88,11 +87,11 @@ pub fn pictures(
             samples.describe(&mut metadata);
         }
         if to_stdout {
-            let bytes = encode_png(&picture, &display, &metadata).map_err(Failure::input)?;
+            let bytes = encode_png(&picture, &tone, &metadata).map_err(Failure::input)?;
             let mut out = std::io::stdout().lock();
             out.write_all(&bytes).and_then(|()| out.flush()).map_err(|e| stdout_failure(&e))?;
         } else {
-            write(path, &picture, &display, &metadata).map_err(Failure::input)?;
+            write(path, &picture, &tone, &metadata).map_err(Failure::input)?;
         }
     }
     Ok(())
