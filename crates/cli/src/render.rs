@@ -4,6 +4,7 @@ use crate::args::RenderOptions;
 use crate::machine::{Interrupt, pool, vector_instructions};
 use crate::parts::{Share, StateInfo, StoredRender};
 use crate::progress::Display;
+use crate::reserve::{Plan, Reserve};
 use crate::stats::{Stages, peak_memory};
 use crate::{Failure, output, overrides};
 use serde_json::json;
@@ -93,6 +94,9 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
             ));
         }
     }
+    // How many samples fit the time is not known.
+    let expected = if limited { samples.min(usual_samples) } else { samples };
+    let reserve = Reserve::new(&Plan::of_session(&paths, &live, expected, keeps_samples))?;
     let stop = StopConditions {
         samples,
         time: options.time,
@@ -122,6 +126,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     }
     detail(&format!("{:.2} samples per pixel in {rendered:.2} s", live.film().mean_samples()));
 
+    drop(reserve);
     output::pictures(&paths, live.film(), live.document(), live.folder(), info.as_ref())?;
     stages.end("write");
     if let Some(path) = &options.run.stats {

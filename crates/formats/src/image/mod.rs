@@ -30,6 +30,7 @@ mod error;
 mod exr;
 mod jpeg;
 mod map;
+mod memory;
 mod metadata;
 mod png;
 mod radiance;
@@ -38,6 +39,7 @@ mod tiff;
 
 pub use error::ImageError;
 pub use map::read_map;
+pub use memory::bytes_to_write;
 pub use metadata::Metadata;
 pub use texels::Map;
 use texels::MapFailure;
