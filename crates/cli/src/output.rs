@@ -6,22 +6,51 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use tyndall::film::{Film, Image};
-use tyndall_formats::image::{Metadata, Picture, encode_png, write};
+use tyndall_formats::image::{Metadata, Picture, encode_png, read_metadata, write};
 use tyndall_live::document::{Background, Document, Light};
 
 /// The name of standard output.
 const STDOUT: &str = "-";
 
-/// Where pictures go: the paths given, or the input's stem with .png in the current folder.
-pub fn paths(asked: &[PathBuf], input: &Path) -> Vec<PathBuf> {
+/// Where pictures go: the paths given, or the input's stem with .png in the current folder. Without being asked, nothing is replaced but
+/// an earlier picture.
+pub fn paths(asked: &[PathBuf], input: &Path) -> Result<Vec<PathBuf>, Failure> {
     if !asked.is_empty() {
-        return asked.to_vec();
+        return Ok(asked.to_vec());
     }
+    let path = default_path(input);
+    check_replaceable(&path, input)?;
+    Ok(vec![path])
+}
+
+/// The input's stem with .png.
+fn default_path(input: &Path) -> PathBuf {
     let name = input.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     // "head.nii.gz" has two extensions.
     let name = name.strip_suffix(".gz").unwrap_or(&name);
     let stem = Path::new(name).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    vec![PathBuf::from(format!("{stem}.png"))]
+    PathBuf::from(format!("{stem}.png"))
+}
+
+/// Refuses to replace the input, and whatever is no picture of Tyndall's.
+fn check_replaceable(path: &Path, input: &Path) -> Result<(), Failure> {
+    // A link that leads nowhere is something too.
+    if path.symlink_metadata().is_err() {
+        return Ok(());
+    }
+    let name = tyndall::message::path_name(path);
+    let is_input =
+        path.canonicalize().is_ok_and(|path| input.canonicalize().is_ok_and(|input| path == input));
+    let found = if is_input {
+        "is the input"
+    } else if matches!(read_metadata(path), Ok(Some(_))) {
+        return Ok(());
+    } else {
+        "exists, and Tyndall did not make it"
+    };
+    Err(Failure::usage(format!(
+        "`{name}` {found}: it is not replaced unless asked for; name the picture with -o"
+    )))
 }
 
 /// Refuses, before any work, paths that cannot be written and paths that are named twice.
@@ -171,7 +200,7 @@ mod tests {
 
     #[test]
     fn the_default_path_is_the_stem_in_the_current_folder() {
-        let path = |input: &str| paths(&[], Path::new(input))[0].to_string_lossy().into_owned();
+        let path = |input: &str| default_path(Path::new(input)).to_string_lossy().into_owned();
         assert_eq!(path("a/head.nrrd"), "head.png");
         assert_eq!(path("a/b.c/head.nii.gz"), "head.png");
         assert_eq!(path("scene.toml"), "scene.png");

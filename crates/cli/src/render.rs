@@ -44,7 +44,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let threads = pool(options.run.threads)?;
     let level = vector_instructions()?;
     let mut input = Input::open(&options.input).map_err(Failure::input)?;
-    let paths = output::paths(&options.outputs, &options.input);
+    let paths = output::paths(&options.outputs, &options.input)?;
     output::check(&paths, options.run.stats.as_deref())?;
     if options.part.is_some() {
         output::check_exr(&paths, "--part")?;
