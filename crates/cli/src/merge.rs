@@ -4,9 +4,10 @@ use crate::args::MergeOptions;
 use crate::parts::{Share, StoredRender};
 use crate::reserve::{Plan, Reserve};
 use crate::{Failure, output};
+use std::io::Write;
 use std::path::Path;
 use tyndall::film::Film;
-use tyndall::message::path_name;
+use tyndall::message::{path_name, sentence};
 
 /// Merges the parts of a render, given in any order, to the picture of the whole.
 pub fn run(options: &MergeOptions) -> Result<(), Failure> {
@@ -34,6 +35,9 @@ pub fn run(options: &MergeOptions) -> Result<(), Failure> {
     let mut info = first.stored.info.clone();
     info.part = None;
     let info = options.resumable.then_some(info);
+    for text in output::notes(&options.outputs, &first.stored.document) {
+        drop(writeln!(std::io::stderr(), "tyndall: note: {}", sentence(&text)));
+    }
     let folder = first.stored.path.parent().unwrap_or(Path::new(""));
     output::pictures(&options.outputs, &film, &first.stored.document, folder, info.as_ref())
 }

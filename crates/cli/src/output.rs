@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use tyndall::film::{Film, Image};
-use tyndall_formats::image::{Metadata, Picture, encode_png, read_metadata, write};
+use tyndall_formats::image::{Metadata, Picture, encode_png, keeps_transparency, read_metadata, write};
 use tyndall_live::document::{Background, Document, Light};
 
 /// The name of standard output.
@@ -85,6 +85,21 @@ pub fn check_exr(paths: &[PathBuf], option: &str) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::usage(format!("{option} needs an OpenEXR file, which holds the samples; add -o FILE.exr")))
+}
+
+/// What a user should know of the kinds of pictures asked for, before the work.
+pub fn notes(paths: &[PathBuf], document: &Document) -> Vec<String> {
+    let is_lost = |path: &&PathBuf| path.as_os_str() != STDOUT && !keeps_transparency(path);
+    if document.film.background != Background::Transparent {
+        return Vec::new();
+    }
+    let note = |path: &PathBuf| {
+        let name = tyndall::message::path_name(path);
+        format!(
+            "{name}: JPEG has no transparent pixels: they will be white; write .png, .tif or .exr to keep them"
+        )
+    };
+    paths.iter().filter(is_lost).map(note).collect()
 }
 
 /// Writes the film to every path; into OpenEXR files with its samples if they are described.

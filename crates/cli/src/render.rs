@@ -60,7 +60,8 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let load_s = stages.end("load");
     let mut live = LiveSession::of(loaded, on).map_err(Failure::input)?;
     if !options.run.quiet {
-        for text in live.notes() {
+        let of_outputs = output::notes(&paths, live.document());
+        for text in live.notes().iter().chain(&of_outputs) {
             drop(writeln!(std::io::stderr(), "tyndall: note: {}", sentence(text)));
         }
     }

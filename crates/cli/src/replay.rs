@@ -94,6 +94,7 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
         let samples = live.document().render.samples;
         run.refine(&mut live, samples);
         drop(reserve);
+        output::notes(&options.outputs, live.document()).iter().for_each(|text| note(text));
         output::pictures(&options.outputs, live.film(), live.document(), live.folder(), None)?;
     }
     played?;

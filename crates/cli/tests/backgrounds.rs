@@ -50,6 +50,32 @@ fn a_white_background_is_white_and_leaves_the_matter_alone() {
     }
 }
 
+/// JPEG has no opacity: nothing is white, as on paper, and a note says so before the work.
+#[test]
+fn a_transparent_background_is_white_in_jpeg_with_a_note() {
+    let folder = scene("film.background = 'transparent'");
+    for method in METHODS {
+        let outputs = ["-o", "a.jpg", "-o", "b.JPEG", "-o", "a.png", "-o", "a.exr"];
+        let few = ["--integrator", method.name, "--set", "render.photon.photons=1000"];
+        let ended = folder.run(&[&["render", "../scene.toml"], &few[..], &outputs].concat());
+        assert_eq!(ended.status, Some(0), "{}", ended.stderr);
+        let notes: Vec<&str> = ended.stderr.lines().filter(|line| line.contains("JPEG")).collect();
+        assert_eq!(notes.len(), 2, "{}", ended.stderr);
+        assert!(
+            notes[0].contains("note: a.jpg: JPEG has no transparent pixels: they will be white"),
+            "{}",
+            notes[0]
+        );
+        let whites = || zune_jpeg::JpegDecoder::new(std::io::Cursor::new(written(&folder, "a.jpg"))).decode();
+        let pixels = whites().expect("a JPEG");
+        assert!(pixels[..3].iter().all(|&code| code >= 253), "{}: {:?}", method.name, &pixels[..3]);
+        assert!(pixels[3 * (16 * 8 + 8)] < 240, "{}: the matter", method.name);
+    }
+    // Nothing is said where nothing is lost.
+    run(&folder, &["render", "../scene.toml", "-o", "a.png"]);
+    run(&folder, &["render", "../scene.toml", "--set", "film.background=0", "-o", "a.jpg"]);
+}
+
 #[test]
 fn a_visible_environment_is_light_and_goes_through_the_curve() {
     let folder = scene("lights = [{ type = 'environment', radiance = [1, 1, 1] }]");

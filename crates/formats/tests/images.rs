@@ -152,7 +152,7 @@ fn tiff_shows_the_tone_mapped_picture() {
 }
 
 #[test]
-fn jpeg_shows_the_picture_over_black() {
+fn jpeg_shows_a_transparent_picture_over_white() {
     let path = folder("jpeg_pixels").join("a.jpg");
     // One colour per 8 x 8 block, which JPEG keeps nearly exactly.
     let block = |x: usize| if x < 8 { [0.5, 0.1, 0.02, 0.5] } else { [0.02, 0.3, 0.4, 1.0] };
@@ -163,7 +163,9 @@ fn jpeg_shows_the_picture_over_black() {
     let pixels = decoder.decode().unwrap();
     assert_eq!(decoder.dimensions().unwrap(), (16, 8));
     for (index, (pixel, linear)) in pixels.chunks(3).zip(&picture.rgba).enumerate() {
-        let expected = shown(*linear, false);
+        let paper = 1.0 - linear[3];
+        let toned = DISPLAY.curve.map(Rgb::new(linear[0], linear[1], linear[2]), DISPLAY.stops);
+        let expected = toned.to_array().map(|light| quantize(paper + light));
         let difference = pixel.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
         assert!(difference <= 3, "pixel {index}: {pixel:?}, expected {expected:?}");
     }
@@ -171,16 +173,20 @@ fn jpeg_shows_the_picture_over_black() {
 
 /// The pixels of a picture of 8 bits, three bytes each.
 fn opaque_pixels(path: &Path) -> Vec<u8> {
-    let bytes = fs::read(path).unwrap();
-    match path.extension().unwrap().to_str().unwrap() {
+    let bytes = fs::read(path).expect("a file");
+    match path.extension().and_then(|kind| kind.to_str()).expect("a kind") {
         "png" => {
-            let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
-            let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
-            reader.next_frame(&mut pixels).unwrap();
+            let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().expect("a PNG");
+            let mut pixels = vec![0; reader.output_buffer_size().expect("a size")];
+            reader.next_frame(&mut pixels).expect("pixels");
             pixels
         }
-        "jpg" => zune_jpeg::JpegDecoder::new(Cursor::new(bytes)).decode().unwrap(),
-        _ => match tiff::decoder::Decoder::new(Cursor::new(bytes)).unwrap().read_image().unwrap() {
+        "jpg" => zune_jpeg::JpegDecoder::new(Cursor::new(bytes)).decode().expect("a JPEG"),
+        _ => match tiff::decoder::Decoder::new(Cursor::new(bytes))
+            .expect("a TIFF")
+            .read_image()
+            .expect("pixels")
+        {
             tiff::decoder::DecodingResult::U8(pixels) => pixels,
             _ => panic!("not 8 bit"),
         },

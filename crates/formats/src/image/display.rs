@@ -1,12 +1,15 @@
 //! The picture as 8-bit code values.
 
 use tyndall::film::tone::quantize;
+use tyndall::math::Rgb;
 use tyndall::simd::Level;
 
-use super::{Picture, Tone};
+use super::{Backdrop, Picture, Tone};
 
-/// Opaque RGB, three bytes a pixel; premultiplied colours of a transparent picture already are the picture over black.
+/// Opaque RGB, three bytes a pixel; a transparent picture is shown over white.
 pub(super) fn rgb8(picture: &Picture, tone: &Tone) -> Vec<u8> {
+    let white = Backdrop { color: Rgb::WHITE, in_radiance: false };
+    let tone = if picture.transparent { Tone { backdrop: Some(white), ..*tone } } else { *tone };
     let mut codes = vec![[0; 3]; picture.rgba.len()];
     tone.encode(Level::best(), &picture.rgba, &mut codes);
     codes.into_flattened()
@@ -57,7 +60,10 @@ mod tests {
     }
 
     #[test]
-    fn over_black_is_premultiplied() {
-        assert_eq!(rgb8(&picture([0.18, 0.0, 0.5, 0.5]), &LINEAR), [118, 0, 188]);
+    fn what_cannot_be_transparent_is_over_white() {
+        assert_eq!(rgb8(&picture([0.18, 0.0, 0.5, 0.6]), &LINEAR), [220, 102, 255]);
+        assert_eq!(rgb8(&picture([0.0; 4]), &LINEAR), [255; 3]);
+        let opaque = Picture { transparent: false, ..picture([0.18, 0.0, 0.5, 0.5]) };
+        assert_eq!(rgb8(&opaque, &LINEAR), [118, 0, 188]);
     }
 }

@@ -23,7 +23,7 @@ use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 use crate::atomic;
-use tyndall::film::{StateLayer, Tone};
+use tyndall::film::{Backdrop, StateLayer, Tone};
 
 mod display;
 mod error;
@@ -83,7 +83,7 @@ impl Picture {
 /// ignores.
 ///
 /// The file appears whole or not at all: it is written beside its destination and then moved there.
-/// JPEG has no opacity, so a transparent picture is written over black.
+/// JPEG has no opacity, so a transparent picture is written over white, see [`keeps_transparency`].
 ///
 /// # Errors
 /// [`ImageError::Extension`] for an unknown kind, [`ImageError::TooLarge`] where the kind has a limit,
@@ -114,6 +114,12 @@ pub fn check_destination(path: &Path) -> Result<(), ImageError> {
         return Err(ImageError::extension(path, EXTENSIONS));
     }
     atomic::check(path).map_err(|source| ImageError::unwritable(path, source))
+}
+
+/// Whether the kind given by the path's extension can hold transparent pixels: all but JPEG.
+#[must_use]
+pub fn keeps_transparency(path: &Path) -> bool {
+    !matches!(Kind::of_extension(path), Some(Kind::Jpeg))
 }
 
 /// The bytes of a PNG file, to be written to a pipe.
