@@ -2,11 +2,10 @@
 
 use super::error::ReadError;
 use super::fields::numbered_files;
-use super::layout::Layout;
+use super::layout::{Layout, Samples};
 use super::stream::{Concatenated, Stream};
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
-use tyndall::volume::Voxels;
 
 /// The files that the value of `key` names: the list below it, a numbered pattern, or one file.
 pub(super) fn names(
@@ -66,11 +65,11 @@ pub(super) fn read(
     names: &[String],
     layout: &Layout,
     open: impl Fn(&Path, u64) -> Result<Stream<'static>, ReadError>,
-) -> Result<Voxels, ReadError> {
+) -> Result<Samples, ReadError> {
     let folder = folder_of(header);
     let paths: Vec<PathBuf> = names.iter().map(|name| folder.join(name)).collect();
     let total = layout.bytes();
-    let voxels = match &paths[..] {
+    let samples = match &paths[..] {
         [path] => open(path, total).and_then(|stream| layout.read(path, stream)),
         _ if layout.text => {
             let fix = "use one data file, or binary samples";
@@ -79,9 +78,10 @@ pub(super) fn read(
         _ => {
             let each = total / paths.len() as u64;
             let parts = Concatenated::new(paths, each, |path: &Path| open(path, each));
+            let surplus = parts.surplus();
             let reader = Box::new(BufReader::with_capacity(1 << 16, parts));
-            layout.read(header, Stream { reader, available: None })
+            layout.read(header, Stream { surplus, ..Stream::of(reader) })
         }
     };
-    voxels.map_err(|error| error.in_data_file(header))
+    samples.map_err(|error| error.in_data_file(header))
 }

@@ -4,7 +4,7 @@
 //! element, whereas here samples are read in one block.
 
 use super::error::ReadError;
-use super::layout::{Axis, Layout, check_memory};
+use super::layout::{Axis, Layout, Samples, check_memory};
 use super::sample_type::{Endian, SampleType};
 use super::stream::{self, Coding, Start};
 use super::{Loaded, Parsed};
@@ -37,7 +37,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
     let grid =
         Grid::centred(dims, [1.0; 3]).map_err(|source| ReadError::Grid { path: path.into(), source })?;
     let samples = stream::samples(path, file, Coding::Raw, Start::After(0), layout.bytes())?;
-    let mut voxels = layout.read(path, samples)?;
+    let Samples { mut voxels, notes } = layout.read(path, samples)?;
     if stored == Stored::Half {
         let bricks = Bricks::bytes(grid.dims(), 4).unwrap_or(u64::MAX);
         check_memory(path, (4 * grid.len() as u64).saturating_add(bricks))?;
@@ -48,7 +48,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
         voxels = transposed(voxels, dims);
     }
     let (channels, times) = (layout.count(Axis::Channel), layout.count(Axis::Time));
-    Parsed { grid, voxels, values: ValueMap::IDENTITY, channels, times, notes: Vec::new() }.load(path)
+    Parsed { grid, voxels, values: ValueMap::IDENTITY, channels, times, notes }.load(path)
 }
 
 /// The dictionary before the samples, as text.
