@@ -73,7 +73,7 @@ pub struct RenderOptions {
     /// Write the picture to FILE: .png .jpg .tif (tone-mapped, 8 bit) or .exr (linear float); repeatable
     ///
     /// `-` writes a PNG to standard output. Without this option the picture goes to the current folder, as the
-    /// input's name with .png.
+    /// input's name with .png, where it replaces an earlier picture of Tyndall's, but neither the input nor any other file.
     #[arg(short, long = "output", value_name = "FILE")]
     pub outputs: Vec<PathBuf>,
 

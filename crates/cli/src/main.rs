@@ -14,6 +14,7 @@ mod parts;
 mod progress;
 mod render;
 mod replay;
+mod reserve;
 mod stats;
 
 use args::{Args, Command};

@@ -2,10 +2,12 @@
 
 use crate::args::MergeOptions;
 use crate::parts::{Share, StoredRender};
+use crate::reserve::{Plan, Reserve};
 use crate::{Failure, output};
+use std::io::Write;
 use std::path::Path;
 use tyndall::film::Film;
-use tyndall::message::path_name;
+use tyndall::message::{path_name, sentence};
 
 /// Merges the parts of a render, given in any order, to the picture of the whole.
 pub fn run(options: &MergeOptions) -> Result<(), Failure> {
@@ -17,6 +19,7 @@ pub fn run(options: &MergeOptions) -> Result<(), Failure> {
         options.parts.iter().map(|path| PartFile::open(path)).collect::<Result<_, _>>()?;
     parts.sort_by_key(|part| part.share.number);
     check_complete(&parts)?;
+    let reserve = parts.first().map(|part| Reserve::new(&plan(options, part))).transpose()?;
     let mut merged: Option<Film> = None;
     for part in &parts {
         let film = part.film()?;
@@ -28,11 +31,23 @@ pub fn run(options: &MergeOptions) -> Result<(), Failure> {
     let (Some(first), Some(film)) = (parts.first(), merged) else {
         return Err(Failure::usage("found no part; name all of them"));
     };
+    drop(reserve);
     let mut info = first.stored.info.clone();
     info.part = None;
     let info = options.resumable.then_some(info);
+    for text in output::notes(&options.outputs, &first.stored.document) {
+        drop(writeln!(std::io::stderr(), "tyndall: note: {}", sentence(&text)));
+    }
     let folder = first.stored.path.parent().unwrap_or(Path::new(""));
     output::pictures(&options.outputs, &film, &first.stored.document, folder, info.as_ref())
+}
+
+/// Films of the whole and of a part, which may be as large, are in memory at once.
+fn plan<'a>(options: &'a MergeOptions, first: &PartFile) -> Plan<'a> {
+    let (size, samples) = (first.stored.document.film.size, first.stored.info.samples);
+    let state = if options.resumable { Film::bytes([1, 1], 0, samples) } else { 0 };
+    let work = Film::bytes(size, 0, samples).saturating_mul(2);
+    Plan { paths: &options.outputs, size, state, work, threads: 1 }
 }
 
 /// A part, of which only the metadata have been read.

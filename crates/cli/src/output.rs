@@ -6,22 +6,51 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use tyndall::film::{Film, Image};
-use tyndall_formats::image::{Display, Metadata, Picture, encode_png, write};
+use tyndall_formats::image::{Metadata, Picture, encode_png, keeps_transparency, read_metadata, write};
 use tyndall_live::document::{Background, Document, Light};
 
 /// The name of standard output.
 const STDOUT: &str = "-";
 
-/// Where pictures go: the paths given, or the input's stem with .png in the current folder.
-pub fn paths(asked: &[PathBuf], input: &Path) -> Vec<PathBuf> {
+/// Where pictures go: the paths given, or the input's stem with .png in the current folder. Without being asked, nothing is replaced but
+/// an earlier picture.
+pub fn paths(asked: &[PathBuf], input: &Path) -> Result<Vec<PathBuf>, Failure> {
     if !asked.is_empty() {
-        return asked.to_vec();
+        return Ok(asked.to_vec());
     }
+    let path = default_path(input);
+    check_replaceable(&path, input)?;
+    Ok(vec![path])
+}
+
+/// The input's stem with .png.
+fn default_path(input: &Path) -> PathBuf {
     let name = input.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     // "head.nii.gz" has two extensions.
     let name = name.strip_suffix(".gz").unwrap_or(&name);
     let stem = Path::new(name).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    vec![PathBuf::from(format!("{stem}.png"))]
+    PathBuf::from(format!("{stem}.png"))
+}
+
+/// Refuses to replace the input, and whatever is no picture of Tyndall's.
+fn check_replaceable(path: &Path, input: &Path) -> Result<(), Failure> {
+    // A link that leads nowhere is something too.
+    if path.symlink_metadata().is_err() {
+        return Ok(());
+    }
+    let name = tyndall::message::path_name(path);
+    let is_input =
+        path.canonicalize().is_ok_and(|path| input.canonicalize().is_ok_and(|input| path == input));
+    let found = if is_input {
+        "is the input"
+    } else if matches!(read_metadata(path), Ok(Some(_))) {
+        return Ok(());
+    } else {
+        "exists, and Tyndall did not make it"
+    };
+    Err(Failure::usage(format!(
+        "`{name}` {found}: it is not replaced unless asked for; name the picture with -o"
+    )))
 }
 
 /// Refuses, before any work, paths that cannot be written and paths that are named twice.
@@ -58,6 +87,21 @@ pub fn check_exr(paths: &[PathBuf], option: &str) -> Result<(), Failure> {
     Err(Failure::usage(format!("{option} needs an OpenEXR file, which holds the samples; add -o FILE.exr")))
 }
 
+/// What a user should know of the kinds of pictures asked for, before the work.
+pub fn notes(paths: &[PathBuf], document: &Document) -> Vec<String> {
+    let is_lost = |path: &&PathBuf| path.as_os_str() != STDOUT && !keeps_transparency(path);
+    if document.film.background != Background::Transparent {
+        return Vec::new();
+    }
+    let note = |path: &PathBuf| {
+        let name = tyndall::message::path_name(path);
+        format!(
+            "{name}: JPEG has no transparent pixels: they will be white; write .png, .tif or .exr to keep them"
+        )
+    };
+    paths.iter().filter(is_lost).map(note).collect()
+}
+
 /// Writes the film to every path; into OpenEXR files with its samples if they are described.
 pub fn pictures(
     paths: &[PathBuf],
@@ -76,8 +120,7 @@ pub fn pictures(
         transparent: document.film.background == Background::Transparent,
         state: Vec::new(),
     };
-    let tone = document.film.tone.curve();
-    let display = Display { tone, exposure: document.film.exposure };
+    let tone = document.film.shown();
     for path in paths {
         let to_stdout = path.as_os_str() == STDOUT;
         let folder = if to_stdout { Path::new("") } else { path.parent().unwrap_or(Path::new("")) };
@@ -88,11 +131,11 @@ pub fn pictures(
             samples.describe(&mut metadata);
         }
         if to_stdout {
-            let bytes = encode_png(&picture, &display, &metadata).map_err(Failure::input)?;
+            let bytes = encode_png(&picture, &tone, &metadata).map_err(Failure::input)?;
             let mut out = std::io::stdout().lock();
             out.write_all(&bytes).and_then(|()| out.flush()).map_err(|e| stdout_failure(&e))?;
         } else {
-            write(path, &picture, &display, &metadata).map_err(Failure::input)?;
+            write(path, &picture, &tone, &metadata).map_err(Failure::input)?;
         }
     }
     Ok(())
@@ -172,7 +215,7 @@ mod tests {
 
     #[test]
     fn the_default_path_is_the_stem_in_the_current_folder() {
-        let path = |input: &str| paths(&[], Path::new(input))[0].to_string_lossy().into_owned();
+        let path = |input: &str| default_path(Path::new(input)).to_string_lossy().into_owned();
         assert_eq!(path("a/head.nrrd"), "head.png");
         assert_eq!(path("a/b.c/head.nii.gz"), "head.png");
         assert_eq!(path("scene.toml"), "scene.png");

@@ -4,6 +4,7 @@ use crate::args::RenderOptions;
 use crate::machine::{Interrupt, pool, vector_instructions};
 use crate::parts::{Share, StateInfo, StoredRender};
 use crate::progress::Display;
+use crate::reserve::{Plan, Reserve};
 use crate::stats::{Stages, peak_memory};
 use crate::{Failure, output, overrides};
 use serde_json::json;
@@ -43,7 +44,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let threads = pool(options.run.threads)?;
     let level = vector_instructions()?;
     let mut input = Input::open(&options.input).map_err(Failure::input)?;
-    let paths = output::paths(&options.outputs, &options.input);
+    let paths = output::paths(&options.outputs, &options.input)?;
     output::check(&paths, options.run.stats.as_deref())?;
     if options.part.is_some() {
         output::check_exr(&paths, "--part")?;
@@ -59,7 +60,8 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let load_s = stages.end("load");
     let mut live = LiveSession::of(loaded, on).map_err(Failure::input)?;
     if !options.run.quiet {
-        for text in live.notes() {
+        let of_outputs = output::notes(&paths, live.document());
+        for text in live.notes().iter().chain(&of_outputs) {
             drop(writeln!(std::io::stderr(), "tyndall: note: {}", sentence(text)));
         }
     }
@@ -93,6 +95,9 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
             ));
         }
     }
+    // How many samples fit the time is not known.
+    let expected = if limited { samples.min(usual_samples) } else { samples };
+    let reserve = Reserve::new(&Plan::of_session(&paths, &live, expected, keeps_samples))?;
     let stop = StopConditions {
         samples,
         time: options.time,
@@ -122,6 +127,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     }
     detail(&format!("{:.2} samples per pixel in {rendered:.2} s", live.film().mean_samples()));
 
+    drop(reserve);
     output::pictures(&paths, live.film(), live.document(), live.folder(), info.as_ref())?;
     stages.end("write");
     if let Some(path) = &options.run.stats {

@@ -3,6 +3,7 @@
 use crate::args::ReplayOptions;
 use crate::edits::{self, Edit};
 use crate::machine::{Interrupt, pool, vector_instructions};
+use crate::reserve::{Plan, Reserve};
 use crate::{Failure, output, overrides, say};
 use serde_json::{Map, Value, json};
 use std::io::Write;
@@ -25,6 +26,12 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
     overrides::lay_over(&mut input, &options.scene, options.samples)?;
     let on = Options { threads: threads.clone(), level, edits: true };
     let mut live = LiveSession::start(input, on).map_err(Failure::input)?;
+    let writes = !options.outputs.is_empty();
+    let plan = |live: &LiveSession| {
+        let samples = live.document().render.samples;
+        Reserve::new(&Plan::of_session(&options.outputs, live, samples, false))
+    };
+    let mut reserve = writes.then(|| plan(&live)).transpose()?;
     interrupt.picture_begins();
     let run = Run { verify: options.verify, interrupt: &interrupt };
     let begun = Instant::now();
@@ -80,9 +87,14 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
         output::statistics(path, &statistics)?;
     }
     // Also when an edit was bad: the picture before it is not lost.
-    if !options.outputs.is_empty() && live.film().samples() > 0 {
+    if writes && live.film().samples() > 0 {
+        // Edits may have changed the size.
+        drop(reserve.take());
+        reserve = Some(plan(&live)?);
         let samples = live.document().render.samples();
         run.refine(&mut live, samples);
+        drop(reserve);
+        output::notes(&options.outputs, live.document()).iter().for_each(|text| note(text));
         output::pictures(&options.outputs, live.film(), live.document(), live.folder(), None)?;
     }
     played?;

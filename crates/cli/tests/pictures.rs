@@ -93,6 +93,55 @@ fn without_an_output_the_picture_goes_to_the_inputs_stem_in_the_current_folder()
     assert_eq!(files_in_out(&folder), ["scene.png"]);
 }
 
+/// Without -o only an earlier picture is replaced: neither the input nor what another program made.
+#[test]
+fn what_tyndall_did_not_make_is_replaced_only_when_asked_for() {
+    let folder = with_scene(SCENE);
+    let render = ["render", "../scene.toml", "-q"];
+    run(&folder, &render);
+    let first = written(&folder, "scene.png");
+    run(&folder, &[&render[..], &["--seed", "3"]].concat());
+    let own = written(&folder, "scene.png");
+    assert!(first != own, "an earlier picture is replaced");
+
+    let refused = |arguments: &[&str], kept: &[u8]| {
+        let Ended { status, stderr, .. } = folder.run(arguments);
+        assert_eq!(status, Some(2), "{arguments:?}: {stderr}");
+        assert!(stderr.contains("`scene.png`") && stderr.contains("with -o"), "{stderr}");
+        assert!(written(&folder, "scene.png") == kept, "{arguments:?}: it was replaced");
+    };
+    refused(&["render", "scene.png", "-q"], &own);
+    refused(&["render", &folder.at("out/scene.png").to_string_lossy(), "-q"], &own);
+    // From another folder it is not the input.
+    folder.put("deep/scene.png", &own);
+    run(&folder, &["render", "../deep/scene.png", "-q"]);
+
+    let mut foreign = Vec::new();
+    let mut encoder = png::Encoder::new(&mut foreign, 1, 1);
+    encoder.add_itxt_chunk("Software".to_owned(), "another".to_owned()).expect("a text");
+    encoder.write_header().expect("a header").write_image_data(&[0]).expect("a pixel");
+    for others in [&foreign[..], b"notes", b"", &own[..own.len().min(40)]] {
+        folder.put("out/scene.png", others);
+        refused(&render, others);
+    }
+    folder.put("data/scene.nrrd", "NRRD0004\ntype: uchar\ndimension: 1\nsizes: 2\nencoding: raw\n\nab");
+    folder.put("out/scene.png", &foreign);
+    refused(&["render", "../data/scene.nrrd", "-q"], &foreign);
+    run(&folder, &[&render[..], &["-o", "scene.png"]].concat());
+    assert!(written(&folder, "scene.png") != foreign, "it was asked for");
+
+    #[cfg(unix)]
+    {
+        let place = folder.at("out/scene.png");
+        std::fs::remove_file(&place).expect("the picture");
+        std::os::unix::fs::symlink(folder.at("deep/scene.png"), &place).expect("a link");
+        refused(&["render", "../deep/scene.png", "-q"], &own);
+        std::fs::remove_file(&place).expect("the link");
+        std::os::unix::fs::symlink(folder.at("nowhere"), &place).expect("a link");
+        assert_eq!(folder.run(&render).status, Some(2));
+    }
+}
+
 #[test]
 fn a_dash_is_standard_output() {
     let folder = with_scene(SCENE);

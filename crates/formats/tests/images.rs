@@ -6,15 +6,15 @@ use std::path::Path;
 
 use common::{folder, for_damaged_copies, rewrite};
 use tyndall::film::tone::{ToneCurve, quantize};
-use tyndall::film::{StateLayer, StateValues};
+use tyndall::film::{Backdrop, StateLayer, StateValues, Tone};
 use tyndall::math::Rgb;
 use tyndall_formats::image::{
-    Display, ImageError, Metadata, Picture, PictureState, encode_png, read_metadata, read_state, write,
+    ImageError, Metadata, Picture, PictureState, encode_png, read_metadata, read_state, write,
 };
 
 mod common;
 
-const DISPLAY: Display = Display { tone: ToneCurve::Agx, exposure: 0.5 };
+const DISPLAY: Tone = Tone { curve: ToneCurve::Agx, stops: 0.5, backdrop: None };
 const KINDS: [&str; 6] = ["png", "jpg", "JPEG", "tif", "TIFF", "exr"];
 
 /// Every pixel has a different colour, opacity and layer values.
@@ -53,7 +53,7 @@ fn entries(metadata: &Metadata) -> Vec<(&str, &str)> {
 /// What an 8-bit kind should hold for one pixel.
 fn shown([r, g, b, alpha]: [f32; 4], transparent: bool) -> Vec<u8> {
     let share = if transparent { alpha } else { 1.0 };
-    let colour = DISPLAY.tone.map(Rgb::new(r, g, b) / share, DISPLAY.exposure).to_array();
+    let colour = DISPLAY.curve.map(Rgb::new(r, g, b) / share, DISPLAY.stops).to_array();
     let mut bytes = colour.map(quantize).to_vec();
     if transparent {
         bytes.push(quantize(alpha));
@@ -152,7 +152,7 @@ fn tiff_shows_the_tone_mapped_picture() {
 }
 
 #[test]
-fn jpeg_shows_the_picture_over_black() {
+fn jpeg_shows_a_transparent_picture_over_white() {
     let path = folder("jpeg_pixels").join("a.jpg");
     // One colour per 8 x 8 block, which JPEG keeps nearly exactly.
     let block = |x: usize| if x < 8 { [0.5, 0.1, 0.02, 0.5] } else { [0.02, 0.3, 0.4, 1.0] };
@@ -163,10 +163,69 @@ fn jpeg_shows_the_picture_over_black() {
     let pixels = decoder.decode().unwrap();
     assert_eq!(decoder.dimensions().unwrap(), (16, 8));
     for (index, (pixel, linear)) in pixels.chunks(3).zip(&picture.rgba).enumerate() {
-        let expected = shown(*linear, false);
+        let paper = 1.0 - linear[3];
+        let toned = DISPLAY.curve.map(Rgb::new(linear[0], linear[1], linear[2]), DISPLAY.stops);
+        let expected = toned.to_array().map(|light| quantize(paper + light));
         let difference = pixel.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
         assert!(difference <= 3, "pixel {index}: {pixel:?}, expected {expected:?}");
     }
+}
+
+/// The pixels of a picture of 8 bits, three bytes each.
+fn opaque_pixels(path: &Path) -> Vec<u8> {
+    let bytes = fs::read(path).expect("a file");
+    match path.extension().and_then(|kind| kind.to_str()).expect("a kind") {
+        "png" => {
+            let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().expect("a PNG");
+            let mut pixels = vec![0; reader.output_buffer_size().expect("a size")];
+            reader.next_frame(&mut pixels).expect("pixels");
+            pixels
+        }
+        "jpg" => zune_jpeg::JpegDecoder::new(Cursor::new(bytes)).decode().expect("a JPEG"),
+        _ => match tiff::decoder::Decoder::new(Cursor::new(bytes))
+            .expect("a TIFF")
+            .read_image()
+            .expect("pixels")
+        {
+            tiff::decoder::DecodingResult::U8(pixels) => pixels,
+            _ => panic!("not 8 bit"),
+        },
+    }
+}
+
+/// Paper behind the matter is white in every kind, whatever is done to the light; OpenEXR keeps it linear.
+#[test]
+fn a_backdrop_is_shown_as_it_is_in_every_kind() {
+    let folder = folder("backdrop");
+    // One colour per 8 x 8 block, which JPEG keeps nearly exactly: nothing, half covered, covered.
+    let blocks = [[1.0, 0.25, 1.0, 0.0], [0.6, 0.225, 0.5, 0.5], [0.3, 0.2, 0.1, 1.0]];
+    let rgba: Vec<_> = (0..24 * 8).map(|i| blocks[i % 24 / 8]).collect();
+    let picture = Picture { width: 24, height: 8, rgba, ..Picture::default() };
+    let backdrop = Some(Backdrop { color: Rgb::new(1.0, 0.25, 1.0), in_radiance: true });
+    for curve in [ToneCurve::Agx, ToneCurve::Linear, ToneCurve::Reinhard, ToneCurve::Aces] {
+        let tone = Tone { curve, stops: -1.5, backdrop };
+        // sRGB(0.25) is 137 of 255; the light of the second block is (0.1, 0.1, 0).
+        let toned = |light: [f32; 3]| curve.map(light.into(), -1.5).to_array();
+        let of = |toned: [f32; 3], seen: f32| -> [u8; 3] {
+            let paper = [1.0, 137.0 / 255.0, 1.0];
+            std::array::from_fn(|c| quantize(paper[c] * seen + toned[c]))
+        };
+        let expected = [of([0.0; 3], 1.0), of(toned([0.1, 0.1, 0.0]), 0.5), of(toned([0.3, 0.2, 0.1]), 0.0)];
+        for kind in ["png", "jpg", "tif"] {
+            let path = folder.join(format!("a.{kind}"));
+            write(&path, &picture, &tone, &small()).unwrap();
+            for (index, pixel) in opaque_pixels(&path).chunks(3).enumerate() {
+                let expected = expected[index % 24 / 8];
+                let difference = pixel.iter().zip(expected).map(|(a, b)| a.abs_diff(b)).max().unwrap();
+                let loss = if kind == "jpg" { 3 } else { 1 };
+                assert!(difference <= loss, "{kind}, {curve:?}, {index}: {pixel:?}, expected {expected:?}");
+            }
+        }
+    }
+    let path = folder.join("a.exr");
+    write(&path, &picture, &Tone { backdrop, ..Tone::default() }, &small()).unwrap();
+    let map = tyndall_formats::image::read_map(&path).unwrap();
+    assert_eq!(map.pixels[8].to_array(), [0.6, 0.225, 0.5]);
 }
 
 #[test]

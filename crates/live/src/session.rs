@@ -14,7 +14,7 @@ use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use tyndall::film::{Film, Image, Tone, Viewer};
+use tyndall::film::{Film, Image, Viewer};
 use tyndall::integrator::{MethodReport, Resources, method_of};
 use tyndall::scene::{Difference, Scene};
 use tyndall::session::{Budget, Progress, Session};
@@ -233,8 +233,7 @@ impl LiveSession {
 
     /// Brings a viewer's picture up to date, toned as the document says; see [`Viewer::look`].
     pub fn look(&self, viewer: &mut Viewer, picture: &mut Vec<[u8; 3]>) {
-        let film = &self.document().film;
-        self.session.look(viewer, Tone { curve: film.tone.curve(), stops: film.exposure }, picture);
+        self.session.look(viewer, self.document().film.shown(), picture);
     }
 
     /// Continues with the samples of another film of the same scene, see [`Session::go_on_with`].

@@ -1,32 +1,41 @@
 //! The picture as 8-bit code values.
 
 use tyndall::film::tone::quantize;
+use tyndall::math::Rgb;
 use tyndall::simd::Level;
 
-use super::{Display, Picture};
+use super::{Backdrop, Picture, Tone};
 
-/// Opaque RGB, three bytes a pixel; premultiplied colours of a transparent picture already are the picture over black.
-pub(super) fn rgb8(picture: &Picture, display: &Display) -> Vec<u8> {
-    encoded(picture.rgba.iter().map(|&[r, g, b, _]| [r, g, b]), display).into_flattened()
+/// Opaque RGB, three bytes a pixel; a transparent picture is shown over white.
+pub(super) fn rgb8(picture: &Picture, tone: &Tone) -> Vec<u8> {
+    let white = Backdrop { color: Rgb::WHITE, in_radiance: false };
+    let tone = if picture.transparent { Tone { backdrop: Some(white), ..*tone } } else { *tone };
+    let mut codes = vec![[0; 3]; picture.rgba.len()];
+    tone.encode(Level::best(), &picture.rgba, &mut codes);
+    codes.into_flattened()
 }
+
+/// Pixels whose colours are divided by their opacity at once.
+const BATCH: usize = 4096;
 
 /// Straight RGBA, four bytes a pixel: colours are divided by opacity before the tone curve; opacity stays linear.
 ///
 /// Where the opacity is 0 the pixel is transparent black: straight alpha cannot represent light at zero opacity.
-pub(super) fn straight_rgba8(picture: &Picture, display: &Display) -> Vec<u8> {
-    let codes = encoded(picture.rgba.iter().map(|&[r, g, b, alpha]| [r, g, b].map(|x| x / alpha)), display);
-    let pixel = |(&[_, _, _, alpha], [r, g, b]): (&[f32; 4], [u8; 3])| match quantize(alpha) {
-        0 => [0; 4],
-        opacity => [r, g, b, opacity],
-    };
-    picture.rgba.iter().zip(codes).flat_map(pixel).collect()
-}
-
-fn encoded(pixels: impl Iterator<Item = [f32; 3]>, display: &Display) -> Vec<[u8; 3]> {
-    let pixels: Vec<[f32; 3]> = pixels.collect();
-    let mut codes = vec![[0; 3]; pixels.len()];
-    display.tone.encode(Level::best(), display.exposure, &pixels, &mut codes);
-    codes
+pub(super) fn straight_rgba8(picture: &Picture, tone: &Tone) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(4 * picture.rgba.len());
+    let mut codes = [[0; 3]; BATCH];
+    for pixels in picture.rgba.chunks(BATCH) {
+        let straight: Vec<_> = pixels.iter().map(|&[r, g, b, a]| [r / a, g / a, b / a, 1.0]).collect();
+        let codes = &mut codes[..pixels.len()];
+        tone.encode(Level::best(), &straight, codes);
+        bytes.extend(pixels.iter().zip(codes).flat_map(
+            |(&[_, _, _, alpha], &mut [r, g, b])| match quantize(alpha) {
+                0 => [0; 4],
+                opacity => [r, g, b, opacity],
+            },
+        ));
+    }
+    bytes
 }
 
 #[cfg(test)]
@@ -35,7 +44,7 @@ mod tests {
 
     use super::*;
 
-    const LINEAR: Display = Display { tone: ToneCurve::Linear, exposure: 0.0 };
+    const LINEAR: Tone = Tone { curve: ToneCurve::Linear, stops: 0.0, backdrop: None };
 
     fn picture(rgba: [f32; 4]) -> Picture {
         Picture { width: 1, height: 1, rgba: vec![rgba], transparent: true, ..Picture::default() }
@@ -51,7 +60,10 @@ mod tests {
     }
 
     #[test]
-    fn over_black_is_premultiplied() {
-        assert_eq!(rgb8(&picture([0.18, 0.0, 0.5, 0.5]), &LINEAR), [118, 0, 188]);
+    fn what_cannot_be_transparent_is_over_white() {
+        assert_eq!(rgb8(&picture([0.18, 0.0, 0.5, 0.6]), &LINEAR), [220, 102, 255]);
+        assert_eq!(rgb8(&picture([0.0; 4]), &LINEAR), [255; 3]);
+        let opaque = Picture { transparent: false, ..picture([0.18, 0.0, 0.5, 0.5]) };
+        assert_eq!(rgb8(&opaque, &LINEAR), [118, 0, 188]);
     }
 }

@@ -8,7 +8,7 @@ use std::io::{BufRead, Read};
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 
 use super::error::EncodeFailure;
-use super::{Display, Metadata, Picture, display};
+use super::{Metadata, Picture, Tone, display};
 
 /// Out of 100; the loss is not visible.
 const QUALITY: u8 = 95;
@@ -20,11 +20,7 @@ const START_OF_SCAN: u8 = 0xDA;
 const END_OF_IMAGE: u8 = 0xD9;
 const COMMENT: u8 = 0xFE;
 
-pub(super) fn encode(
-    picture: &Picture,
-    display: &Display,
-    metadata: &Metadata,
-) -> Result<Vec<u8>, EncodeFailure> {
+pub(super) fn encode(picture: &Picture, tone: &Tone, metadata: &Metadata) -> Result<Vec<u8>, EncodeFailure> {
     let (Ok(width), Ok(height)) = (u16::try_from(picture.width), u16::try_from(picture.height)) else {
         let limit = "65535 x 65535 in JPEG".to_owned();
         return Err(EncodeFailure::TooLarge { width: picture.width, height: picture.height, limit });
@@ -34,7 +30,7 @@ pub(super) fn encode(
     encoder.set_sampling_factor(SamplingFactor::F_1_1);
     encoder.set_optimized_huffman_tables(true);
     encoder
-        .encode(&display::rgb8(picture, display), width, height, ColorType::Rgb)
+        .encode(&display::rgb8(picture, tone), width, height, ColorType::Rgb)
         .map_err(|error| EncodeFailure::library(&error))?;
     Ok(insert_after_header(coded, &comments(metadata)))
 }

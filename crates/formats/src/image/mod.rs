@@ -5,13 +5,14 @@
 //! Every written picture carries its [`Metadata`], so that it can be rendered again.
 //!
 //! ```
-//! use tyndall_formats::image::{Display, Metadata, Picture, read_metadata, write};
+//! use tyndall::film::Tone;
+//! use tyndall_formats::image::{Metadata, Picture, read_metadata, write};
 //!
 //! let path = std::env::temp_dir().join("tyndall-doc.exr");
 //! let picture = Picture { width: 1, height: 1, rgba: vec![[0.2, 0.3, 0.4, 1.0]], ..Picture::default() };
 //! let mut metadata = Metadata::default();
 //! metadata.insert(Metadata::SEED, "7");
-//! write(&path, &picture, &Display::default(), &metadata)?;
+//! write(&path, &picture, &Tone::default(), &metadata)?;
 //! assert_eq!(read_metadata(&path)?, Some(metadata));
 //! # std::fs::remove_file(&path).ok();
 //! # Ok::<(), tyndall_formats::image::ImageError>(())
@@ -22,14 +23,14 @@ use std::io::{BufReader, Read, Seek};
 use std::path::Path;
 
 use crate::atomic;
-use tyndall::film::StateLayer;
-use tyndall::film::tone::ToneCurve;
+use tyndall::film::{Backdrop, StateLayer, Tone};
 
 mod display;
 mod error;
 mod exr;
 mod jpeg;
 mod map;
+mod memory;
 mod metadata;
 mod png;
 mod radiance;
@@ -38,6 +39,7 @@ mod tiff;
 
 pub use error::ImageError;
 pub use map::read_map;
+pub use memory::bytes_to_write;
 pub use metadata::Metadata;
 pub use texels::Map;
 use texels::MapFailure;
@@ -77,19 +79,11 @@ impl Picture {
     }
 }
 
-/// How the 8-bit kinds display a picture; OpenEXR ignores it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Display {
-    /// From radiance to code values.
-    pub tone: ToneCurve,
-    /// Multiplies by 2^exposure before the curve.
-    pub exposure: f32,
-}
-
-/// Writes a picture in the kind given by the path's extension, in any case.
+/// Writes a picture in the kind given by the path's extension, in any case. The 8-bit kinds are shown as `tone` says, which OpenEXR
+/// ignores.
 ///
 /// The file appears whole or not at all: it is written beside its destination and then moved there.
-/// JPEG has no opacity, so a transparent picture is written over black.
+/// JPEG has no opacity, so a transparent picture is written over white, see [`keeps_transparency`].
 ///
 /// # Errors
 /// [`ImageError::Extension`] for an unknown kind, [`ImageError::TooLarge`] where the kind has a limit,
@@ -97,17 +91,12 @@ pub struct Display {
 ///
 /// # Panics
 /// If the picture is empty or its layers differ in size.
-pub fn write(
-    path: &Path,
-    picture: &Picture,
-    display: &Display,
-    metadata: &Metadata,
-) -> Result<(), ImageError> {
+pub fn write(path: &Path, picture: &Picture, tone: &Tone, metadata: &Metadata) -> Result<(), ImageError> {
     picture.check();
     let bytes = match Kind::of_extension(path) {
-        Some(Kind::Png) => png::encode(picture, display, metadata),
-        Some(Kind::Jpeg) => jpeg::encode(picture, display, metadata),
-        Some(Kind::Tiff) => tiff::encode(picture, display, metadata),
+        Some(Kind::Png) => png::encode(picture, tone, metadata),
+        Some(Kind::Jpeg) => jpeg::encode(picture, tone, metadata),
+        Some(Kind::Tiff) => tiff::encode(picture, tone, metadata),
         Some(Kind::Exr) => exr::encode(picture, metadata),
         None => return Err(ImageError::extension(path, EXTENSIONS)),
     };
@@ -127,6 +116,12 @@ pub fn check_destination(path: &Path) -> Result<(), ImageError> {
     atomic::check(path).map_err(|source| ImageError::unwritable(path, source))
 }
 
+/// Whether the kind given by the path's extension can hold transparent pixels: all but JPEG.
+#[must_use]
+pub fn keeps_transparency(path: &Path) -> bool {
+    !matches!(Kind::of_extension(path), Some(Kind::Jpeg))
+}
+
 /// The bytes of a PNG file, to be written to a pipe.
 ///
 /// # Errors
@@ -134,9 +129,9 @@ pub fn check_destination(path: &Path) -> Result<(), ImageError> {
 ///
 /// # Panics
 /// If the picture is empty or its layers differ in size.
-pub fn encode_png(picture: &Picture, display: &Display, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
+pub fn encode_png(picture: &Picture, tone: &Tone, metadata: &Metadata) -> Result<Vec<u8>, ImageError> {
     picture.check();
-    png::encode(picture, display, metadata).map_err(|failure| failure.at(Path::new("standard output")))
+    png::encode(picture, tone, metadata).map_err(|failure| failure.at(Path::new("standard output")))
 }
 
 /// The metadata in a picture of any of the four kinds, recognised by content; `None` if it has none of ours.

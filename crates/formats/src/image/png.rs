@@ -7,20 +7,16 @@ use png::{BitDepth, ColorType, Decoder, Encoder, EncodingError, SrgbRenderingInt
 
 use super::error::EncodeFailure;
 use super::metadata::{Metadata, is_own};
-use super::{Display, Picture, display};
+use super::{Picture, Tone, display};
 
 /// Most bytes of text that are decompressed from one picture.
 const TEXT_LIMIT: usize = 64 << 20;
 
-pub(super) fn encode(
-    picture: &Picture,
-    display: &Display,
-    metadata: &Metadata,
-) -> Result<Vec<u8>, EncodeFailure> {
-    try_encode(picture, display, metadata).map_err(|error| EncodeFailure::library(&error))
+pub(super) fn encode(picture: &Picture, tone: &Tone, metadata: &Metadata) -> Result<Vec<u8>, EncodeFailure> {
+    try_encode(picture, tone, metadata).map_err(|error| EncodeFailure::library(&error))
 }
 
-fn try_encode(picture: &Picture, display: &Display, metadata: &Metadata) -> Result<Vec<u8>, EncodingError> {
+fn try_encode(picture: &Picture, tone: &Tone, metadata: &Metadata) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, picture.width, picture.height);
     encoder.set_color(if picture.transparent { ColorType::Rgba } else { ColorType::Rgb });
@@ -33,9 +29,9 @@ fn try_encode(picture: &Picture, display: &Display, metadata: &Metadata) -> Resu
         writer.write_text_chunk(&chunk)?;
     }
     let pixels = if picture.transparent {
-        display::straight_rgba8(picture, display)
+        display::straight_rgba8(picture, tone)
     } else {
-        display::rgb8(picture, display)
+        display::rgb8(picture, tone)
     };
     writer.write_image_data(&pixels)?;
     writer.finish()?;

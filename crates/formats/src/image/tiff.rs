@@ -8,20 +8,16 @@ use tiff::encoder::{Compression, DeflateLevel, TiffEncoder};
 use tiff::tags::{ExtraSamples, Tag, Type};
 
 use super::error::EncodeFailure;
-use super::{Display, Metadata, Picture, display};
+use super::{Metadata, Picture, Tone, display};
 
 /// Most bytes of text that are read from one picture, whatever the file's length.
 const TEXT_LIMIT: u64 = 64 << 20;
 
-pub(super) fn encode(
-    picture: &Picture,
-    display: &Display,
-    metadata: &Metadata,
-) -> Result<Vec<u8>, EncodeFailure> {
-    try_encode(picture, display, metadata).map_err(|error| EncodeFailure::library(&error))
+pub(super) fn encode(picture: &Picture, tone: &Tone, metadata: &Metadata) -> Result<Vec<u8>, EncodeFailure> {
+    try_encode(picture, tone, metadata).map_err(|error| EncodeFailure::library(&error))
 }
 
-fn try_encode(picture: &Picture, display: &Display, metadata: &Metadata) -> Result<Vec<u8>, TiffError> {
+fn try_encode(picture: &Picture, tone: &Tone, metadata: &Metadata) -> Result<Vec<u8>, TiffError> {
     let mut file = Cursor::new(Vec::new());
     let mut encoder =
         TiffEncoder::new(&mut file)?.with_compression(Compression::Deflate(DeflateLevel::Balanced));
@@ -31,9 +27,9 @@ fn try_encode(picture: &Picture, display: &Display, metadata: &Metadata) -> Resu
     }
     if picture.transparent {
         image.extra_samples(&[ExtraSamples::UnassociatedAlpha])?;
-        image.write_data(&display::straight_rgba8(picture, display))?;
+        image.write_data(&display::straight_rgba8(picture, tone))?;
     } else {
-        image.write_data(&display::rgb8(picture, display))?;
+        image.write_data(&display::rgb8(picture, tone))?;
     }
     Ok(file.into_inner())
 }

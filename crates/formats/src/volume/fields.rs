@@ -1,69 +1,119 @@
 //! Text headers of keys and values, as in NRRD and MetaImage.
 
 use super::error::ReadError;
+use std::borrow::Cow;
 use std::io::{BufRead, Read};
 use std::path::Path;
 use std::str::FromStr;
 
-/// Longer text, in bytes, is refused as a header.
-const LONGEST_HEADER: usize = 1 << 20;
+/// Bytes of a line that are kept. No entry that a reader needs is longer; comments, and what other programs store, may be.
+const KEPT: usize = 1 << 16;
 
-/// Reads lines, at most [`LONGEST_HEADER`] bytes of them.
+/// Reads lines. However long a header is, no more than a line of it is kept.
 pub(super) struct Lines<'a> {
     path: &'a Path,
     reader: &'a mut dyn BufRead,
-    left: usize,
+    /// The last line.
+    bytes: Vec<u8>,
+}
+
+/// A line of a header.
+#[derive(Debug)]
+pub(super) struct Line<'a> {
+    /// Without its ending; the first [`KEPT`] bytes.
+    pub text: Cow<'a, str>,
+    /// Whether it is longer.
+    pub is_cut: bool,
 }
 
 impl<'a> Lines<'a> {
     pub fn new(path: &'a Path, reader: &'a mut dyn BufRead) -> Self {
-        Self { path, reader, left: LONGEST_HEADER }
+        Self { path, reader, bytes: Vec::new() }
     }
 
-    /// The next line without its line ending; `None` at the end of the file.
-    pub fn next_line(&mut self) -> Result<Option<String>, ReadError> {
-        let mut line = Vec::new();
-        let mut limited = (&mut *self.reader).take(self.left as u64);
-        let read = limited.read_until(b'\n', &mut line).map_err(|source| ReadError::io(self.path, source))?;
-        self.left -= read;
-        if self.left == 0 {
-            let expected = "a text header of at most 1 MiB";
-            return Err(ReadError::header(self.path, "header", "more than 1 MiB of text", expected));
-        }
+    /// The next line; `None` at the end of the file.
+    pub fn next_line(&mut self) -> Result<Option<Line<'_>>, ReadError> {
+        let trouble = |source| ReadError::io(self.path, source);
+        let line = &mut self.bytes;
+        line.clear();
+        let read = (&mut *self.reader).take(KEPT as u64).read_until(b'\n', line).map_err(trouble)?;
         if read == 0 {
             return Ok(None);
         }
-        let text = String::from_utf8_lossy(&line);
-        Ok(Some(text.trim_end_matches(['\n', '\r']).to_string()))
+        let is_cut = line.len() == KEPT && line.last() != Some(&b'\n');
+        if is_cut {
+            self.reader.skip_until(b'\n').map_err(trouble)?;
+        }
+        while line.pop_if(|byte| matches!(byte, b'\n' | b'\r')).is_some() {}
+        Ok(Some(Line { text: String::from_utf8_lossy(line), is_cut }))
+    }
+
+    /// The names of files, one a line, to the end of the file; `key` names the list.
+    ///
+    /// # Errors
+    /// [`ReadError::Header`] for more than [`MOST_FILES`].
+    pub fn names(&mut self, key: &str) -> Result<Vec<String>, ReadError> {
+        let (mut names, path) = (Vec::new(), self.path);
+        while let Some(Line { text, is_cut }) = self.next_line()? {
+            let name = text.trim();
+            if is_cut || names.len() == MOST_FILES {
+                let expected = format!("at most {MOST_FILES} names of files, one a line");
+                return Err(ReadError::header(path, key, name, &expected));
+            }
+            if !name.is_empty() {
+                names.push(name.to_string());
+            }
+        }
+        Ok(names)
     }
 }
 
-/// The entries of a header; keys are compared ignoring case and whitespace.
+/// The entries of a header that its reader knows; keys are compared ignoring case and whitespace.
 #[derive(Debug)]
 pub(super) struct Fields<'a> {
     pub path: &'a Path,
-    entries: Vec<(String, String)>,
+    known: &'static [&'static str],
+    /// By position in `known`; of repeated entries, the last.
+    values: Vec<Option<String>>,
 }
 
 impl<'a> Fields<'a> {
-    pub fn new(path: &'a Path) -> Self {
-        Self { path, entries: Vec::new() }
+    /// Without entries; those of keys that are not `known` are not kept, however many there are.
+    pub fn new(path: &'a Path, known: &'static [&'static str]) -> Self {
+        Self { path, known, values: vec![None; known.len()] }
     }
 
     /// Whether two keys are the same.
     pub fn same(key: &str, other: &str) -> bool {
-        plain(key) == plain(other)
+        let first =
+            |key: &str| key.bytes().find(|b| !b.is_ascii_whitespace()).map(|b| b.to_ascii_lowercase());
+        // Nearly all keys differ there, and there may be millions.
+        let differ = |a: Option<u8>, b: Option<u8>| {
+            a != b && a.is_some_and(|a| a.is_ascii()) && b.is_some_and(|b| b.is_ascii())
+        };
+        !differ(first(key), first(other)) && plain(key).eq(plain(other))
     }
 
-    pub fn insert(&mut self, key: &str, value: &str) {
-        self.entries.push((plain(key), value.trim().to_string()));
+    /// Keeps the entry of a line, whose value ends with the line, if its key is known.
+    ///
+    /// # Errors
+    /// [`ReadError::Header`] if the line was cut.
+    pub fn insert(&mut self, key: &str, value: &str, line: &Line<'_>) -> Result<(), ReadError> {
+        let Some(place) = self.known.iter().position(|known| Self::same(known, key)) else { return Ok(()) };
+        if line.is_cut {
+            let expected = format!("an entry of less than {} KiB", KEPT >> 10);
+            return Err(ReadError::header(self.path, key.trim(), value.trim(), &expected));
+        }
+        self.values[place] = Some(value.trim().to_string());
+        Ok(())
     }
 
-    /// The value of the first of these keys that is present; of repeated entries, the last.
+    /// The value of the first of these keys that is present; all must be known.
     pub fn get(&self, keys: &[&str]) -> Option<&str> {
         keys.iter().find_map(|key| {
-            let key = plain(key);
-            self.entries.iter().rev().find(|(k, _)| *k == key).map(|(_, value)| value.as_str())
+            let place = self.known.iter().position(|known| Self::same(known, key));
+            debug_assert!(place.is_some(), "`{key}` is read, but not kept");
+            self.values[place?].as_deref()
         })
     }
 
@@ -104,12 +154,12 @@ pub(super) fn finite(word: &str) -> Option<f64> {
     word.parse().ok().filter(|v: &f64| v.is_finite())
 }
 
-fn plain(key: &str) -> String {
-    key.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_lowercase).collect()
+fn plain(key: &str) -> impl Iterator<Item = char> {
+    key.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_lowercase)
 }
 
 /// More slices than any scanner produces; names of more files would need too much memory.
-const MOST_FILES: usize = 1 << 16;
+pub(super) const MOST_FILES: usize = 1 << 16;
 
 /// The files that a header names by a pattern such as `slice%03d.raw`, numbered `first`, `first + step` ... `last`.
 ///
@@ -176,9 +226,25 @@ mod tests {
     }
 
     #[test]
-    fn an_endless_header_is_refused() {
-        let text = vec![b'x'; LONGEST_HEADER + 1];
-        let mut reader = &text[..];
-        assert!(Lines::new(Path::new("test"), &mut reader).next_line().is_err());
+    fn of_a_long_line_the_beginning_is_kept() {
+        let text =
+            [vec![b'x'; KEPT - 1], b"\n".to_vec(), vec![b'y'; 3 * KEPT], b"\r\nlast".to_vec()].concat();
+        let mut reader = std::io::BufReader::with_capacity(7, &text[..]);
+        let mut lines = Lines::new(Path::new("test"), &mut reader);
+        let mut next = || lines.next_line().unwrap().map(|line| (line.text.len(), line.is_cut));
+        assert_eq!(
+            [next(), next(), next(), next()],
+            [Some((KEPT - 1, false)), Some((KEPT, true)), Some((4, false)), None]
+        );
+    }
+
+    #[test]
+    fn a_needed_entry_that_was_cut_is_refused_and_others_are_not_kept() {
+        let mut fields = Fields::new(Path::new("test"), &["sizes"]);
+        let line = |is_cut| Line { text: Cow::Borrowed(""), is_cut };
+        assert!(fields.insert("comment", "x", &line(true)).is_ok());
+        assert!(fields.insert("Sizes", "1 2", &line(false)).is_ok());
+        assert_eq!(fields.get(&["sizes"]), Some("1 2"));
+        assert!(fields.insert("sizes", "1 2", &line(true)).unwrap_err().to_string().contains("sizes"));
     }
 }

@@ -3,6 +3,7 @@
 use super::error::ReadError;
 use super::sample_type::{Endian, SampleType};
 use super::stream::{KeepEvery, Stream, fill};
+use super::surplus::{Amount, Decoded, LOOK_AHEAD, Surplus};
 use crate::memory::available;
 use bytemuck::Pod;
 use std::io::{self, BufRead, BufReader, Read};
@@ -20,6 +21,14 @@ pub(super) fn check_memory(path: &Path, needed: u64) -> Result<(), ReadError> {
         }
         _ => Ok(()),
     }
+}
+
+/// What was read.
+#[derive(Debug)]
+pub(super) struct Samples {
+    pub voxels: Voxels,
+    /// What the user should know of it.
+    pub notes: Vec<String>,
 }
 
 /// What an axis of a file stands for.
@@ -89,8 +98,8 @@ impl Layout {
     }
 
     /// Reads the first channel at the first time; `path` is the file that the stream comes from.
-    pub fn read(&self, path: &Path, stream: Stream<'_>) -> Result<Voxels, ReadError> {
-        let Stream { reader, available } = stream;
+    pub fn read(&self, path: &Path, stream: Stream<'_>) -> Result<Samples, ReadError> {
+        let Stream { reader, available, decoded, surplus } = stream;
         if let Some(found) = available
             && !self.text
             && found < self.bytes()
@@ -98,11 +107,15 @@ impl Layout {
             return Err(ReadError::Short { path: path.into(), found, expected: self.bytes() });
         }
         check_memory(path, self.memory())?;
-        if self.text {
-            self.read_text(path, reader)
+        let voxels = if self.text {
+            self.read_text(path, reader, &surplus)?
         } else {
-            self.read_bytes(path, reader, available.is_some())
-        }
+            if let Some(found) = available {
+                surplus.samples(path, Amount::Bytes(found), self.bytes());
+            }
+            self.read_bytes(path, reader, available.is_some(), decoded.map(|decoded| (decoded, &surplus)))?
+        };
+        Ok(Samples { voxels, notes: surplus.notes() })
     }
 
     fn read_bytes<'a>(
@@ -110,6 +123,7 @@ impl Layout {
         path: &Path,
         mut reader: Box<dyn BufRead + 'a>,
         all_there: bool,
+        decoded: Option<(Decoded, &Surplus)>,
     ) -> Result<Voxels, ReadError> {
         let mut inner = self.sample.size();
         let mut slower = self.samples();
@@ -126,17 +140,35 @@ impl Layout {
         let count = self.count(Axis::Space);
         let mut voxels =
             of_type!(self.sample, read_vec(&mut *reader, count, all_there).map_err(|stop| stop.at(path))?);
-        if self.samples() == count && !all_there {
-            check_end(path, &mut *reader)?;
-        }
+        let whole = self.samples() == count;
+        let end = match decoded {
+            Some((decoded, surplus)) => decoded.finish(path, &mut *reader, self.bytes(), whole, surplus),
+            // The last of several files notes what is behind its samples.
+            None if whole && !all_there => reader.fill_buf().map(|_| ()),
+            None => Ok(()),
+        };
+        end.map_err(|error| Stop::Io(error).at(path))?;
         if self.endian != Endian::NATIVE {
             swap_bytes(&mut voxels);
         }
         Ok(voxels)
     }
 
-    fn read_text(&self, path: &Path, mut reader: Box<dyn BufRead + '_>) -> Result<Voxels, ReadError> {
-        Ok(of_type!(self.sample, self.parse_words(path, &mut *reader)?))
+    fn read_text(
+        &self,
+        path: &Path,
+        mut reader: Box<dyn BufRead + '_>,
+        surplus: &Surplus,
+    ) -> Result<Voxels, ReadError> {
+        let voxels = of_type!(self.sample, self.parse_words(path, &mut *reader)?);
+        let stated = self.samples() as u64;
+        let mut found = stated;
+        let mut ahead = reader.take(LOOK_AHEAD);
+        while next_word(&mut ahead).is_ok_and(|word| !word.is_empty()) {
+            found += 1;
+        }
+        surplus.samples(path, Amount::Numbers(found), stated);
+        Ok(voxels)
     }
 
     fn parse_words<T: FromStr>(&self, path: &Path, reader: &mut dyn BufRead) -> Result<Vec<T>, ReadError> {
@@ -233,11 +265,6 @@ fn read_vec<T: Pod>(reader: &mut dyn Read, count: usize, all_there: bool) -> Res
     Ok(data)
 }
 
-/// Lets a decoder reach the end of its stream, where it verifies the checksum.
-fn check_end(path: &Path, reader: &mut dyn BufRead) -> Result<(), ReadError> {
-    reader.fill_buf().map(|_| ()).map_err(|error| Stop::Io(error).at(path))
-}
-
 /// Reverses the byte order of every sample.
 fn swap_bytes(voxels: &mut Voxels) {
     fn two<T: Pod>(data: &mut [T]) {
@@ -296,7 +323,7 @@ mod tests {
 
     fn read(layout: &Layout, bytes: &[u8]) -> Result<Voxels, ReadError> {
         let reader = Box::new(io::Cursor::new(bytes.to_vec()));
-        layout.read(Path::new("test"), Stream { reader, available: None })
+        layout.read(Path::new("test"), Stream::of(reader)).map(|samples| samples.voxels)
     }
 
     #[test]

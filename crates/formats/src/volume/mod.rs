@@ -9,6 +9,7 @@ mod detached;
 mod error;
 mod fields;
 mod layout;
+mod members;
 mod metaimage;
 mod nifti;
 mod nrrd;
@@ -17,6 +18,7 @@ mod placement;
 mod raw;
 mod sample_type;
 mod stream;
+mod surplus;
 
 pub use error::ReadError;
 pub use raw::{RawLayout, read_raw};

@@ -4,16 +4,14 @@
 //! element, whereas here samples are read in one block.
 
 use super::error::ReadError;
-use super::layout::{Axis, Layout, check_memory};
+use super::layout::{Axis, Layout, Samples, check_memory};
 use super::sample_type::{Endian, SampleType};
-use super::stream::{self, Coding, Start, fill};
+use super::stream::{self, Coding, Start};
 use super::{Loaded, Parsed};
 use std::io::Read;
 use std::path::Path;
 use tyndall::volume::{Bricks, Grid, ValueMap, Voxels};
 
-/// Longer headers, in bytes, are refused.
-const LONGEST_HEADER: u32 = 1 << 20;
 /// If the last of four or five axes is at most this long, it holds channels.
 const MOST_CHANNELS: usize = 4;
 
@@ -39,7 +37,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
     let grid =
         Grid::centred(dims, [1.0; 3]).map_err(|source| ReadError::Grid { path: path.into(), source })?;
     let samples = stream::samples(path, file, Coding::Raw, Start::After(0), layout.bytes())?;
-    let mut voxels = layout.read(path, samples)?;
+    let Samples { mut voxels, notes } = layout.read(path, samples)?;
     if stored == Stored::Half {
         let bricks = Bricks::bytes(grid.dims(), 4).unwrap_or(u64::MAX);
         check_memory(path, (4 * grid.len() as u64).saturating_add(bricks))?;
@@ -50,7 +48,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
         voxels = transposed(voxels, dims);
     }
     let (channels, times) = (layout.count(Axis::Channel), layout.count(Axis::Time));
-    Parsed { grid, voxels, values: ValueMap::IDENTITY, channels, times, notes: Vec::new() }.load(path)
+    Parsed { grid, voxels, values: ValueMap::IDENTITY, channels, times, notes }.load(path)
 }
 
 /// The dictionary before the samples, as text.
@@ -78,14 +76,12 @@ fn header(path: &Path, file: &mut dyn Read) -> Result<String, ReadError> {
             return Err(ReadError::header(path, "first bytes", &found, "\\x93NUMPY"));
         }
     };
-    if length > LONGEST_HEADER {
-        return Err(ReadError::header(path, "header length", &length.to_string(), "at most 1 MiB"));
-    }
-    let mut text = vec![0; length as usize];
-    let got = fill(file, &mut text).map_err(trouble)?;
-    if got < text.len() {
-        let expected = format!("{length} bytes");
-        return Err(ReadError::header(path, "header", &format!("{got} bytes"), &expected));
+    // As much as there is: the length may be wrong.
+    let mut text = Vec::new();
+    let got = file.take(length.into()).read_to_end(&mut text).map_err(trouble)?;
+    if got < length as usize {
+        let expected = format!("at most the {got} bytes that follow");
+        return Err(ReadError::header(path, "header length", &length.to_string(), &expected));
     }
     Ok(String::from_utf8_lossy(&text).into_owned())
 }

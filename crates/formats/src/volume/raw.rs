@@ -1,7 +1,7 @@
 //! Raw samples: a file without a header, whose layout the user states.
 
 use super::error::ReadError;
-use super::layout::{Axis, Layout};
+use super::layout::{Axis, Layout, Samples};
 use super::sample_type::{Endian, SampleType};
 use super::stream::{self, Coding, Start};
 use super::{Loaded, Parsed};
@@ -42,8 +42,8 @@ pub fn read_raw(path: &Path, raw: &RawLayout) -> Result<Loaded, ReadError> {
     let layout = Layout::new(path, "dims", axes, raw.dtype, raw.endian)?;
     let file = stream::open(path)?;
     let samples = stream::samples(path, file, Coding::Raw, Start::After(raw.offset), layout.bytes())?;
-    let voxels = layout.read(path, samples)?;
-    Parsed { grid, voxels, values: ValueMap::IDENTITY, channels: 1, times: 1, notes: Vec::new() }.load(path)
+    let Samples { voxels, notes } = layout.read(path, samples)?;
+    Parsed { grid, voxels, values: ValueMap::IDENTITY, channels: 1, times: 1, notes }.load(path)
 }
 
 #[cfg(test)]

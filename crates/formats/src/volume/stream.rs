@@ -1,14 +1,16 @@
 //! Opens files, skips to their samples and decompresses them.
 
 use super::error::ReadError;
-use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
+use super::members::{GZIP, Members};
+use super::surplus::{Amount, Counted, Decoded, Surplus};
+use bzip2::bufread::BzDecoder;
+use flate2::bufread::{GzDecoder, ZlibDecoder};
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom, Take};
 use std::path::{Path, PathBuf};
-
-/// The first bytes of every gzip stream.
-pub(super) const GZIP: [u8; 2] = [0x1f, 0x8b];
+use std::rc::Rc;
 
 /// How the samples were compressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +49,17 @@ pub(super) struct Stream<'a> {
     pub reader: Box<dyn BufRead + 'a>,
     /// Bytes left; known only if they are not compressed.
     pub available: Option<u64>,
+    /// How far they are decompressed, if they are compressed.
+    pub decoded: Option<Decoded>,
+    /// What was found behind the samples.
+    pub surplus: Surplus,
+}
+
+impl<'a> Stream<'a> {
+    /// Bytes of which neither the number is known nor where they come from.
+    pub fn of(reader: Box<dyn BufRead + 'a>) -> Self {
+        Self { reader, available: None, decoded: None, surplus: Surplus::default() }
+    }
 }
 
 /// Opens a regular file that is not empty.
@@ -69,7 +82,8 @@ pub(super) fn first_bytes(path: &Path) -> Result<Vec<u8>, ReadError> {
     let trouble = |source| ReadError::io(path, source);
     let mut file = open(path)?;
     let gzip = file.fill_buf().map_err(trouble)?.starts_with(&GZIP);
-    let mut reader = decode(file, if gzip { Coding::Gzip } else { Coding::Raw }).map_err(trouble)?;
+    let coding = if gzip { Coding::Gzip } else { Coding::Raw };
+    let mut reader = decode(file, coding, &Rc::default()).map_err(trouble)?;
     let mut head = vec![0; 1024];
     // Damage is not reported here but by the reader that is then chosen by the file's name.
     let got = fill(&mut *reader, &mut head).unwrap_or(0);
@@ -92,7 +106,8 @@ pub(super) fn samples(
             let message = format!("{length} bytes cannot hold {needed} bytes of samples, expected more");
             return Err(ReadError::Damaged { path: path.into(), message });
         }
-        let mut reader = decode(file, coding).map_err(trouble)?;
+        let behind = Rc::default();
+        let mut reader = decode(file, coding, &behind).map_err(trouble)?;
         let Start::After(bytes) = start else {
             let fix = "state the number of bytes to skip, or store the samples uncompressed";
             return Err(ReadError::unsupported(path, "skipping to the end of compressed data", fix));
@@ -102,7 +117,9 @@ pub(super) fn samples(
         if skipped < bytes {
             return Err(ReadError::Short { path: path.into(), found: 0, expected: needed });
         }
-        return Ok(Stream { reader, available: None });
+        let decoded = Decoded { count: Rc::default(), behind };
+        let reader = Box::new(Counted { inner: reader, count: Rc::clone(&decoded.count) });
+        return Ok(Stream { decoded: Some(decoded), ..Stream::of(reader) });
     }
     let length = file.get_ref().metadata().map_err(trouble)?.len();
     let position = file.stream_position().map_err(trouble)?;
@@ -111,11 +128,11 @@ pub(super) fn samples(
         Start::AtEnd => length.saturating_sub(needed),
     };
     file.seek(SeekFrom::Start(begin)).map_err(trouble)?;
-    Ok(Stream { reader: Box::new(file), available: Some(length - begin) })
+    Ok(Stream { available: Some(length - begin), ..Stream::of(Box::new(file)) })
 }
 
-/// The decompressed bytes from the current position on.
-pub(super) fn decode(mut file: BufReader<File>, coding: Coding) -> io::Result<Box<dyn BufRead>> {
+/// The decompressed bytes from the current position on; at their end `behind` is set to the number of bytes of the file that follow.
+fn decode(mut file: BufReader<File>, coding: Coding, behind: &Rc<Cell<u64>>) -> io::Result<Box<dyn BufRead>> {
     const CHUNK: usize = 1 << 17;
     let coding = match coding {
         Coding::Zlib if file.fill_buf()?.starts_with(&GZIP) => Coding::Gzip,
@@ -123,9 +140,13 @@ pub(super) fn decode(mut file: BufReader<File>, coding: Coding) -> io::Result<Bo
     };
     Ok(match coding {
         Coding::Raw => Box::new(file),
-        Coding::Gzip => Box::new(BufReader::with_capacity(CHUNK, MultiGzDecoder::new(file))),
-        Coding::Zlib => Box::new(BufReader::with_capacity(CHUNK, ZlibDecoder::new(file))),
-        Coding::Bzip2 => Box::new(BufReader::with_capacity(CHUNK, bzip2::bufread::MultiBzDecoder::new(file))),
+        Coding::Gzip => Box::new(BufReader::with_capacity(CHUNK, Members::<GzDecoder<_>>::new(file, behind))),
+        Coding::Zlib => {
+            Box::new(BufReader::with_capacity(CHUNK, Members::<ZlibDecoder<_>>::new(file, behind)))
+        }
+        Coding::Bzip2 => {
+            Box::new(BufReader::with_capacity(CHUNK, Members::<BzDecoder<_>>::new(file, behind)))
+        }
     })
 }
 
@@ -203,20 +224,48 @@ pub(super) struct Concatenated<F> {
     left: VecDeque<PathBuf>,
     bytes_each: u64,
     open: F,
-    current: Option<(PathBuf, Take<Box<dyn BufRead>>)>,
+    current: Option<Part>,
+    surplus: Surplus,
+}
+
+/// The file that is being read.
+struct Part {
+    path: PathBuf,
+    reader: Take<Box<dyn BufRead>>,
+    available: Option<u64>,
+    decoded: Option<Decoded>,
+}
+
+impl Part {
+    /// Notes what is behind its samples.
+    fn finish(self, stated: u64, surplus: &Surplus) -> io::Result<()> {
+        let Self { path, reader, available, decoded } = self;
+        if let Some(found) = available {
+            surplus.samples(&path, Amount::Bytes(found), stated);
+        }
+        match decoded {
+            Some(decoded) => decoded.finish(&path, &mut *reader.into_inner(), stated, true, surplus),
+            None => Ok(()),
+        }
+    }
 }
 
 impl<F: FnMut(&Path) -> Result<Stream<'static>, ReadError>> Concatenated<F> {
     /// `open` returns the bytes of a file's samples.
     pub fn new(files: Vec<PathBuf>, bytes_each: u64, open: F) -> Self {
-        Self { left: files.into(), bytes_each, open, current: None }
+        Self { left: files.into(), bytes_each, open, current: None, surplus: Surplus::default() }
+    }
+
+    /// What will be found behind the samples of its files.
+    pub fn surplus(&self) -> Surplus {
+        self.surplus.clone()
     }
 }
 
 impl<F: FnMut(&Path) -> Result<Stream<'static>, ReadError>> Read for Concatenated<F> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         loop {
-            if let Some((path, reader)) = &mut self.current {
+            if let Some(Part { path, reader, .. }) = &mut self.current {
                 let n = reader.read(out)?;
                 if n > 0 || out.is_empty() {
                     return Ok(n);
@@ -227,9 +276,13 @@ impl<F: FnMut(&Path) -> Result<Stream<'static>, ReadError>> Read for Concatenate
                     return Err(io::Error::other(short));
                 }
             }
+            if let Some(part) = self.current.take() {
+                part.finish(self.bytes_each, &self.surplus)?;
+            }
             let Some(path) = self.left.pop_front() else { return Ok(0) };
-            let stream = (self.open)(&path).map_err(io::Error::other)?;
-            self.current = Some((path, stream.reader.take(self.bytes_each)));
+            let Stream { reader, available, decoded, .. } = (self.open)(&path).map_err(io::Error::other)?;
+            let reader = reader.take(self.bytes_each);
+            self.current = Some(Part { path, reader, available, decoded });
         }
     }
 }

@@ -3,8 +3,9 @@
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, WritableImage, f16};
 use flate2::{Compression, write::GzEncoder, write::ZlibEncoder};
 use std::io::{Cursor, Write};
+use tyndall::film::Tone;
 use tyndall::film::{StateLayer, StateValues};
-use tyndall_formats::image::{Display, Metadata, Picture, write};
+use tyndall_formats::image::{Metadata, Picture, write};
 
 /// A file's name and content.
 type File = (&'static str, Vec<u8>);
@@ -316,7 +317,7 @@ pub fn pictures() -> Vec<File> {
         .into_iter()
         .map(|name| {
             let path = folder.path().join(name);
-            write(&path, &picture, &Display::default(), &metadata).expect("a picture");
+            write(&path, &picture, &Tone::default(), &metadata).expect("a picture");
             (name, std::fs::read(path).expect("a picture"))
         })
         .collect()

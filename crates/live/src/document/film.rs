@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tyndall::film::Backdrop;
 use tyndall::film::tone::ToneCurve;
 
 use super::shape::{Color, Exposure, Size};
@@ -28,6 +29,18 @@ pub struct Film {
 impl Default for Film {
     fn default() -> Self {
         Self { size: [512; 2], exposure: 0.0, tone: Tone::default(), background: Background::default() }
+    }
+}
+
+impl Film {
+    /// How it is shown in 8 bits.
+    #[must_use]
+    pub fn shown(&self) -> tyndall::film::Tone {
+        let backdrop = match self.background {
+            Background::Color(color) => Some(Backdrop { color: color.into(), in_radiance: true }),
+            Background::Environment | Background::Transparent => None,
+        };
+        tyndall::film::Tone { curve: self.tone.curve(), stops: self.exposure, backdrop }
     }
 }
 

@@ -15,6 +15,9 @@ pub(super) const QUANTITIES: usize = 9;
 /// Position of the luminance's squares, or deviations, among the quantities.
 pub(super) const LUMINANCE_SPREAD: usize = 6;
 
+/// Position of alpha among the quantities.
+pub(super) const ALPHA: usize = 7;
+
 /// Samples in a chunk.
 pub(super) const CHUNK: u32 = 16;
 

@@ -1,19 +1,10 @@
 //! Views of an unfinished film: what changed since the last look, tone-mapped for a display, or as it is.
 
+use super::encode::{BATCH, Encode, Tone};
 use super::tile::{TILE, Tile};
-use super::tone::{BATCH, Encode, ToneCurve};
 use super::{Film, Image};
 use crate::simd::{Kernel, Lanes, Level};
 use rayon::prelude::*;
-
-/// How radiance is shown on a display.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tone {
-    /// The curve.
-    pub curve: ToneCurve,
-    /// Brightens by `2^stops`.
-    pub stops: f32,
-}
 
 /// A viewer of a film, which remembers what it has seen of it. Each look updates, in a picture that the caller keeps, the tiles that
 /// have changed; all of them if the film's size or the tone is another than at the last look. Use one viewer for each picture: it
@@ -133,11 +124,14 @@ impl Kernel for Show<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { tone: Tone { curve, stops }, tile, width, band } = self;
-        let mut planes = [[0.0; BATCH]; 3];
+        let Self { tone, tile, width, band } = self;
+        let (mut planes, mut alpha) = ([[0.0; BATCH]; 3], [0.0; BATCH]);
         tile.radiance(&mut planes);
+        if tone.backdrop.is_some() {
+            tile.alpha(&mut alpha);
+        }
         if let Some(shown) = tile.shown() {
-            for plane in &mut planes {
+            for plane in planes.iter_mut().chain([&mut alpha]) {
                 let own = *plane;
                 for (shown, &source) in plane.iter_mut().zip(&shown) {
                     *shown = own[source];
@@ -146,7 +140,7 @@ impl Kernel for Show<'_> {
         }
         let mut codes = [[0; 3]; BATCH];
         let codes = &mut codes[..tile.pixel_count()];
-        Encode { curve, gain: stops.exp2(), planes: &planes, codes: &mut *codes }.run(simd);
+        Encode { tone, planes: &planes, alpha: &alpha, codes: &mut *codes }.run(simd);
         let (left, columns) = (tile.origin()[0] as usize, tile.size()[0] as usize);
         for (row, codes) in codes.chunks_exact(columns).enumerate() {
             let first = row * width + left;

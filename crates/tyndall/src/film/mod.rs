@@ -4,6 +4,7 @@
 //! cache line across threads and a tile may be some samples ahead of another.
 
 mod columns;
+mod encode;
 mod estimate;
 mod look;
 mod noise;
@@ -12,7 +13,8 @@ mod tile;
 pub mod tone;
 mod tree;
 
-pub use look::{Tone, Viewer};
+pub use encode::{Backdrop, Tone};
+pub use look::Viewer;
 pub use state::{FilmState, StateError, StateLayer, StateValues};
 pub use tile::{Goal, Stride, TILE, Tile};
 

@@ -1,6 +1,6 @@
 //! A running estimate of a picture's noise: each tile measures its own from time to time, while it is in the processor's cache.
 
-use super::tone::BATCH;
+use super::encode::BATCH;
 use super::tree::{Tree, pieces};
 
 /// A tile measures again once it has this many times the samples.

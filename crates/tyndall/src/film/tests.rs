@@ -136,7 +136,7 @@ fn uneven(size: [u32; 2], samples: u32) -> Film {
         let all = (samples + turn % 3) * pixels + more;
         for i in 0..all {
             let x = (i.wrapping_mul(2_654_435_769).wrapping_add(turn) >> 8) as f32 / (1 << 22) as f32;
-            tile.add(&PixelSample { radiance: Rgb::new(x, 2.0 - x, 0.3 * x), alpha: 1.0, depth: 1.0 });
+            tile.add(&PixelSample { radiance: Rgb::new(x, 2.0 - x, 0.3 * x), alpha: x / 4.0, depth: 1.0 });
         }
     }
     film
@@ -144,12 +144,14 @@ fn uneven(size: [u32; 2], samples: u32) -> Film {
 
 #[test]
 fn a_look_shows_what_a_file_would() {
-    let tone = Tone { curve: tone::ToneCurve::Agx, stops: 0.3 };
-    for samples in [1, 15, 16, 70, 300] {
+    let plain = Tone { stops: 0.3, ..Tone::default() };
+    let color = Rgb::new(0.4, 0.6, 0.5);
+    let before_color = Tone { backdrop: Some(Backdrop { color, in_radiance: true }), ..plain };
+    for (samples, tone) in [1, 15, 16, 70, 300].into_iter().flat_map(|n| [(n, plain), (n, before_color)]) {
         let film = uneven([37, 50], samples);
-        let pixels: Vec<[f32; 3]> = film.image().rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+        let pixels = film.image().rgba;
         let mut expected = vec![[0; 3]; pixels.len()];
-        tone.curve.encode(Level::best(), tone.stops, &pixels, &mut expected);
+        tone.encode(Level::best(), &pixels, &mut expected);
         for level in Level::available() {
             let (mut viewer, mut picture) = (Viewer::default(), Vec::new());
             viewer.look(&film, tone, level, &mut picture);
@@ -164,7 +166,7 @@ fn a_look_shows_what_a_file_would() {
 
 #[test]
 fn a_look_renews_what_changed_and_a_missing_pixel_shows_its_blocks_first() {
-    let (tone, level) = (Tone { curve: tone::ToneCurve::Linear, stops: 0.0 }, Level::best());
+    let (tone, level) = (Tone { curve: tone::ToneCurve::Linear, ..Tone::default() }, Level::best());
     let grey = |x: u8| PixelSample { radiance: Rgb::splat(f32::from(x) / 40.0), ..PixelSample::default() };
     let mut film = Film::new([32, 20]);
     let (mut viewer, mut picture) = (Viewer::default(), Vec::new());

@@ -1,9 +1,9 @@
 //! A tile: the unit of work, with the estimates of its pixels.
 
 use super::PixelSample;
+use super::encode::{BATCH, Planes};
 use super::estimate::Estimate;
 use super::noise::TileNoise;
-use super::tone::{BATCH, Planes};
 use super::tree::{Piece, Place, Tree, pieces};
 use crate::math::cast;
 use std::ops::Range;
@@ -272,11 +272,29 @@ impl Tile {
             let mut with_next = [[0.0; BATCH]; 3];
             self.tree.radiance(&after, &mut with_next);
             for (plane, with_next) in planes.iter_mut().zip(&with_next) {
-                for (pixel, &number) in self.order.numbers.iter().enumerate() {
-                    if usize::from(number) < self.ahead {
-                        plane[pixel] = with_next[pixel];
-                    }
-                }
+                self.take_ahead(plane, with_next);
+            }
+        }
+    }
+
+    /// The mean alpha of each pixel, row by row, from its own samples.
+    #[inline(always)]
+    pub(super) fn alpha(&self, plane: &mut [f32; BATCH]) {
+        let [before, after] = self.pieces();
+        self.tree.alpha(&before, plane);
+        if self.ahead > 0 {
+            let mut with_next = [0.0; BATCH];
+            self.tree.alpha(&after, &mut with_next);
+            self.take_ahead(plane, &with_next);
+        }
+    }
+
+    /// Takes the values of the pixels that have one sample more from `with_next`.
+    #[inline(always)]
+    fn take_ahead(&self, plane: &mut [f32; BATCH], with_next: &[f32; BATCH]) {
+        for (pixel, &number) in self.order.numbers.iter().enumerate() {
+            if usize::from(number) < self.ahead {
+                plane[pixel] = with_next[pixel];
             }
         }
     }

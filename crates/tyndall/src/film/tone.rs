@@ -34,66 +34,6 @@ impl ToneCurve {
     pub fn map(self, linear: Rgb, exposure_stops: f32) -> Rgb {
         Level::best().run(MapOne { curve: self, linear: linear * exposure_stops.exp2() })
     }
-
-    /// The same for many pixels, as the nearest of 256 code values. Every vector level gives the same bytes.
-    ///
-    /// # Panics
-    /// If there are not as many `codes` as `pixels`.
-    pub fn encode(self, level: Level, exposure_stops: f32, pixels: &[[f32; 3]], codes: &mut [[u8; 3]]) {
-        assert_eq!(pixels.len(), codes.len(), "pixels and their codes");
-        let gain = exposure_stops.exp2();
-        let mut planes = [[0.0; BATCH]; 3];
-        for (pixels, codes) in pixels.chunks(BATCH).zip(codes.chunks_mut(BATCH)) {
-            for (i, pixel) in pixels.iter().enumerate() {
-                [planes[0][i], planes[1][i], planes[2][i]] = *pixel;
-            }
-            level.run(Encode { curve: self, gain, planes: &planes, codes });
-        }
-    }
-}
-
-/// Number of pixels that are encoded at once.
-pub(super) const BATCH: usize = 256;
-
-/// Radiance of a batch of pixels, channel by channel.
-pub(super) type Planes = [[f32; BATCH]; 3];
-
-/// Encodes the first pixels of a batch, a vector of them at a time.
-pub(super) struct Encode<'a> {
-    pub curve: ToneCurve,
-    /// Multiplies the radiance.
-    pub gain: f32,
-    pub planes: &'a Planes,
-    /// Of at most [`BATCH`] pixels.
-    pub codes: &'a mut [[u8; 3]],
-}
-
-impl Kernel for Encode<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Lanes>(self, simd: S) {
-        let Self { curve, gain, planes: [red, green, blue], codes } = self;
-        for (batch, codes) in codes.chunks_mut(S::WIDTH).enumerate() {
-            let lanes = batch * S::WIDTH..(batch + 1) * S::WIDTH;
-            let r = S::f32s::from_slice(simd, &red[lanes.clone()]) * gain;
-            let g = S::f32s::from_slice(simd, &green[lanes.clone()]) * gain;
-            let b = S::f32s::from_slice(simd, &blue[lanes]) * gain;
-            let [r, g, b] = shown(simd, curve, [r, g, b]);
-            // One number for each pixel, since storing single bytes takes longer than the curve.
-            let packed = level_of::<S>(r) | level_of::<S>(g) << 8 | level_of::<S>(b) << 16;
-            for (code, packed) in codes.iter_mut().zip(packed.as_slice()) {
-                let [r, g, b, _] = packed.to_le_bytes();
-                *code = [r, g, b];
-            }
-        }
-    }
-}
-
-/// The nearest of 256 levels.
-#[inline(always)]
-fn level_of<S: Lanes>(shown: S::f32s) -> S::i32s {
-    (shown * 255.0 + 0.5).to_int()
 }
 
 /// Maps a single pixel.
@@ -116,7 +56,7 @@ impl Kernel for MapOne {
 
 /// The code values, in [0, 1], that show a linear colour.
 #[inline(always)]
-fn shown<S: Lanes>(simd: S, curve: ToneCurve, [r, g, b]: [S::f32s; 3]) -> [S::f32s; 3] {
+pub(super) fn shown<S: Lanes>(simd: S, curve: ToneCurve, [r, g, b]: [S::f32s; 3]) -> [S::f32s; 3] {
     let [r, g, b] = [clip(simd, r, BRIGHTEST), clip(simd, g, BRIGHTEST), clip(simd, b, BRIGHTEST)];
     match curve {
         ToneCurve::Agx => agx(simd, [r, g, b]),
@@ -149,7 +89,7 @@ const BRIGHTEST: f32 = 1e10;
 
 /// Clamps to [0, high]; NaN becomes 0.
 #[inline(always)]
-fn clip<S: Lanes>(simd: S, x: S::f32s, high: f32) -> S::f32s {
+pub(super) fn clip<S: Lanes>(simd: S, x: S::f32s, high: f32) -> S::f32s {
     let zero = S::f32s::splat(simd, 0.0);
     x.simd_gt(zero).select(x.min(high), zero)
 }
@@ -164,8 +104,9 @@ fn encode_lanes<S: Lanes>(simd: S, x: S::f32s) -> S::f32s {
     x.simd_le(linear).select(x * 12.92, root * 1.055 - 0.055).min(1.0)
 }
 
+/// [`encode_lanes`] of each channel.
 #[inline(always)]
-fn encode_all<S: Lanes>(simd: S, [r, g, b]: [S::f32s; 3]) -> [S::f32s; 3] {
+pub(super) fn encode_all<S: Lanes>(simd: S, [r, g, b]: [S::f32s; 3]) -> [S::f32s; 3] {
     [encode_lanes(simd, r), encode_lanes(simd, g), encode_lanes(simd, b)]
 }
 
@@ -256,38 +197,6 @@ mod tests {
             assert_eq!(shown(ToneCurve::Linear, grey), [level; 3]);
         }
         assert_eq!(shown(ToneCurve::Linear, Rgb::splat(0.18)), [118; 3]);
-    }
-
-    /// Pixels of all magnitudes and odd ones, more than fill the last vector.
-    fn pixels() -> Vec<[f32; 3]> {
-        let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, 1e-40, -1.0, 0.0, 1.0];
-        let of = |i: u32, turn: u32| match i.wrapping_mul(turn) >> 8 {
-            bits if bits % 50 == 0 => odd[bits as usize / 50 % 8],
-            bits => (bits as f32 / (1 << 24) as f32 * 40.0 - 30.0).exp2(),
-        };
-        (1..20_000).map(|i| [2_654_435_769, 2_246_822_519, 3_266_489_917].map(|turn| of(i, turn))).collect()
-    }
-
-    #[test]
-    fn every_level_gives_the_same_bytes_and_they_are_those_of_the_single_pixel() {
-        let pixels = pixels();
-        for curve in CURVES {
-            for stops in [0.0, -1.3, 4.0] {
-                let encoded = |level: Level| {
-                    let mut codes = vec![[0; 3]; pixels.len()];
-                    curve.encode(level, stops, &pixels, &mut codes);
-                    codes
-                };
-                let scalar = encoded(Level::available()[0]);
-                for level in Level::available() {
-                    assert!(encoded(level) == scalar, "{curve:?} with {level:?}");
-                }
-                for (pixel, codes) in pixels.iter().zip(&scalar) {
-                    let alone = curve.map(Rgb::from(*pixel), stops).to_array().map(quantize);
-                    assert_eq!(alone, *codes, "{curve:?} of {pixel:?}");
-                }
-            }
-        }
     }
 
     /// The curve for sRGB in lanes against the standard library's power function.

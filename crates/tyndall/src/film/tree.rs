@@ -6,10 +6,11 @@
 
 use super::PixelSample;
 use super::columns::Columns;
+use super::encode::{BATCH, Planes};
 use super::estimate::{
-    CHUNK, Estimate, FAN_OUT, LUMINANCE_SPREAD, QUANTITIES, Sums, mean_of, merged_mean, samples_per_child,
+    ALPHA, CHUNK, Estimate, FAN_OUT, LUMINANCE_SPREAD, QUANTITIES, Sums, mean_of, merged_mean,
+    samples_per_child,
 };
-use super::tone::{BATCH, Planes};
 use crate::math::{LUMINANCE, cast};
 
 /// The samples of the pixels of a tile, from the same number on.
@@ -223,15 +224,26 @@ impl Tree {
     #[inline(always)]
     pub fn radiance(&self, pieces: &[Piece], planes: &mut Planes) {
         for (channel, plane) in planes.iter_mut().enumerate() {
-            for piece in pieces {
-                if let Some(estimates) = self.estimates_at(piece.place) {
-                    for (mean, &part) in plane.iter_mut().zip(estimates.column(channel)) {
-                        merge(mean, part, piece.share);
-                    }
-                } else if let Some(open) = &self.open {
-                    for (mean, &sum) in plane.iter_mut().zip(open.column(channel)) {
-                        merge(mean, mean_of(sum, piece.samples), piece.share);
-                    }
+            self.means(channel, pieces, plane);
+        }
+    }
+
+    /// The same of the mean alpha.
+    #[inline(always)]
+    pub fn alpha(&self, pieces: &[Piece], plane: &mut [f32; BATCH]) {
+        self.means(ALPHA, pieces, plane);
+    }
+
+    #[inline(always)]
+    fn means(&self, quantity: usize, pieces: &[Piece], plane: &mut [f32; BATCH]) {
+        for piece in pieces {
+            if let Some(estimates) = self.estimates_at(piece.place) {
+                for (mean, &part) in plane.iter_mut().zip(estimates.column(quantity)) {
+                    merge(mean, part, piece.share);
+                }
+            } else if let Some(open) = &self.open {
+                for (mean, &sum) in plane.iter_mut().zip(open.column(quantity)) {
+                    merge(mean, mean_of(sum, piece.samples), piece.share);
                 }
             }
         }

@@ -7,7 +7,7 @@ mod tests;
 use super::detached;
 use super::error::ReadError;
 use super::fields::Fields;
-use super::layout::{Axis, Layout};
+use super::layout::{Axis, Layout, Samples};
 use super::placement;
 use super::sample_type::{Endian, SampleType};
 use super::stream::{self, Coding, Start};
@@ -48,7 +48,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
         },
     };
     let value = fields.need(&["ElementDataFile"], "LOCAL, or the name of the file with the samples")?;
-    let voxels = if value.eq_ignore_ascii_case("LOCAL") {
+    let Samples { voxels, notes } = if value.eq_ignore_ascii_case("LOCAL") {
         // `HeaderSize` counts from the beginning of the file.
         let file = if start.is_some() { stream::open(path)? } else { file };
         let start = start.unwrap_or(Start::After(0));
@@ -65,7 +65,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
         intercept: number(&fields, "ElementToIntensityFunctionOffset", 0.0)?,
     };
     let times = layout.count(Axis::Time);
-    Parsed { grid, voxels, values, channels, times, notes: Vec::new() }.load(path)
+    Parsed { grid, voxels, values, channels, times, notes }.load(path)
 }
 
 fn sizes(fields: &Fields) -> Result<Vec<usize>, ReadError> {

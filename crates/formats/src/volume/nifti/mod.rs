@@ -6,9 +6,10 @@ mod orientation;
 mod tests;
 
 use super::error::ReadError;
-use super::layout::{Axis, Layout};
+use super::layout::{Axis, Layout, Samples};
+use super::members::GZIP;
 use super::sample_type::SampleType;
-use super::stream::{self, Coding, GZIP, Start};
+use super::stream::{self, Coding, Start};
 use super::{Loaded, Parsed};
 pub(super) use header::recognises;
 use header::{Header, Storage};
@@ -38,10 +39,11 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
         let samples = stream::samples(data, file, coding, Start::After(header.offset), layout.bytes())?;
         layout.read(data, samples)
     };
-    let voxels = match header.storage {
+    let Samples { voxels, notes: found } = match header.storage {
         Storage::Single => read_from(path)?,
         Storage::Pair => read_from(&other_file(path, "img")?).map_err(|error| error.in_data_file(path))?,
     };
+    notes.extend(found);
     let (channels, times) = (layout.count(Axis::Channel), layout.count(Axis::Time));
     Parsed { grid, voxels, values, channels, times, notes }.load(path)
 }

@@ -11,28 +11,44 @@ use tyndall::volume::{Grid, Space};
 /// Rows of the matrix from index to world (RAS); the last column is the position of voxel (0, 0, 0).
 type Rows = [[f64; 4]; 3];
 
-/// The sform wins over the qform, as in nibabel.
+/// The sform wins over the qform, as in nibabel; one that places nothing (a zero or singular matrix, numbers that are not finite) counts as
+/// absent, as in ITK.
 pub(super) fn grid(path: &Path, header: &Header, notes: &mut Vec<String>) -> Result<Grid, ReadError> {
     let dims = [header.dims[0], header.dims[1], header.dims[2]];
-    let (sform, qform) = (header.sform_code > 0, header.qform_code > 0);
-    let rows = if sform {
-        if qform && differ(&header.sform, &by_quaternion(header), dims) {
-            notes.push("sform and qform disagree: the sform was used".into());
-        }
-        header.sform
-    } else if qform {
-        by_quaternion(header)
-    } else {
-        notes.push(
-            "no sform and no qform: centred, with left and right as in Analyze (index x runs to the left)"
-                .into(),
-        );
-        by_size(header, dims)
-    };
     let unit = millimetres(header.units, notes);
     let to_lps = [-unit, -unit, unit];
-    let column = |j: usize| -> [f64; 3] { std::array::from_fn(|i| to_lps[i] * rows[i][j]) };
-    placement::grid(path, dims, std::array::from_fn(|j| Some(column(j))), column(3), Space::Anatomical)
+    let placed = |rows: &Rows| {
+        let column = |j: usize| -> [f64; 3] { std::array::from_fn(|i| to_lps[i] * rows[i][j]) };
+        placement::grid(path, dims, std::array::from_fn(|j| Some(column(j))), column(3), Space::Anatomical)
+    };
+    let sform = (header.sform_code > 0).then_some(header.sform);
+    let qform = (header.qform_code > 0).then(|| by_quaternion(header));
+    let [of_sform, of_qform] = [sform, qform].map(|rows| rows.and_then(|rows| placed(&rows).ok()));
+    let unusable = |name: &str, code: i32| format!("its {name} (code {code}) is singular or not finite: ");
+    if let Some(grid) = of_sform {
+        if sform.zip(qform).is_some_and(|(sform, qform)| differ(&sform, &qform, dims)) {
+            notes.push("sform and qform disagree: the sform was used".into());
+        }
+        return Ok(grid);
+    }
+    let mut found = String::new();
+    if sform.is_some() {
+        found.push_str(&unusable("sform", header.sform_code));
+    }
+    if let Some(grid) = of_qform {
+        if !found.is_empty() {
+            notes.push(found + "the qform was used");
+        }
+        return Ok(grid);
+    }
+    if qform.is_some() {
+        found.push_str(&unusable("qform", header.qform_code));
+    }
+    if found.is_empty() {
+        found.push_str("no sform and no qform: ");
+    }
+    notes.push(found + "centred, with left and right as in Analyze (index x runs to the left)");
+    placed(&by_size(header, dims))
 }
 
 /// Method 2 of the standard: a unit quaternion whose first component is implied, voxel sizes, and the

@@ -113,6 +113,47 @@ fn without_an_sform_the_quaternion_rotates_and_without_either_the_box_is_centred
     assert_eq!(notes.len(), 1);
 }
 
+/// An sform or qform that places nothing counts as absent, and the note says so.
+#[test]
+fn an_unusable_sform_gives_way_to_the_qform_and_that_to_voxel_sizes() {
+    let turned = |w: &mut Writer| {
+        w.i16(252, 1).f32(264, std::f32::consts::FRAC_1_SQRT_2).f32(268, 5.0);
+    };
+    let mut plain = version_1(false, b"n+1\0");
+    turned(&mut plain);
+    let by_qform = load(&plain).unwrap().volume;
+    let by_size = load(&version_1(false, b"n+1\0")).unwrap().volume;
+    let rows = |rows: [[f32; 4]; 3]| rows;
+    for (what, sform) in [
+        ("zero", rows([[0.0; 4]; 3])),
+        ("singular", [[1.0, 2.0, 0.0, 0.0], [2.0, 4.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]),
+        ("NaN", [[f32::NAN, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]),
+        ("an infinite offset", [[1.0, 0.0, 0.0, f32::INFINITY], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]),
+    ] {
+        let mut w = version_1(false, b"n+1\0");
+        w.i16(254, 2);
+        for (row, numbers) in sform.iter().enumerate() {
+            for (i, &number) in numbers.iter().enumerate() {
+                w.f32(280 + 16 * row + 4 * i, number);
+            }
+        }
+        let check = |w: &Writer, grid: &tyndall::volume::Grid, words: &[&str]| {
+            let Loaded { volume, notes, .. } = load(w).unwrap_or_else(|error| panic!("{what}: {error}"));
+            assert_eq!(volume.grid(), grid, "{what}");
+            let [note] = &notes[..] else { panic!("{what}: {notes:?}") };
+            assert!(words.iter().all(|word| note.contains(word)), "{what}: {note}");
+        };
+        check(&w, by_size.grid(), &["sform (code 2)", "centred"]);
+        turned(&mut w);
+        check(&w, by_qform.grid(), &["sform (code 2)", "qform was used"]);
+        w.f32(268, f32::NAN);
+        check(&w, by_size.grid(), &["sform (code 2)", "qform (code 1)", "centred"]);
+    }
+    plain.f32(256, f32::NAN);
+    let Loaded { volume, notes, .. } = load(&plain).unwrap();
+    assert!(volume.grid() == by_size.grid() && notes[0].contains("qform (code 1)"), "{notes:?}");
+}
+
 #[test]
 fn a_pair_is_read_from_either_file() {
     let (folder, header) = folder_with("a.hdr", &version_1(true, b"ni1\0").bytes);

@@ -1,9 +1,32 @@
 //! The text header of an NRRD file.
 
 use super::super::error::ReadError;
-use super::super::fields::{Fields, Lines};
+use super::super::fields::{Fields, Line, Lines};
 use std::io::BufRead;
 use std::path::Path;
+
+/// The fields that are read.
+const KNOWN: [&str; 19] = [
+    "type",
+    "dimension",
+    "sizes",
+    "encoding",
+    "endian",
+    "data file",
+    "line skip",
+    "byte skip",
+    "space",
+    "space dimension",
+    "space units",
+    "space directions",
+    "space origin",
+    "kinds",
+    "spacings",
+    "axis mins",
+    "axis maxs",
+    "centerings",
+    "centers",
+];
 
 /// The fields, and the data files if the header lists them.
 pub(super) struct Header<'a> {
@@ -16,35 +39,32 @@ pub(super) struct Header<'a> {
 /// end at the end of its file. Comments and key/value pairs (`key:=value`) are skipped.
 pub(super) fn read<'a>(path: &'a Path, reader: &mut dyn BufRead) -> Result<Header<'a>, ReadError> {
     let mut lines = Lines::new(path, reader);
-    let magic = lines.next_line()?.unwrap_or_default();
+    let magic = lines.next_line()?.map(|line| line.text.into_owned()).unwrap_or_default();
     if !matches!(magic.trim_end(), "NRRD0001" | "NRRD0002" | "NRRD0003" | "NRRD0004" | "NRRD0005") {
         return Err(ReadError::header(path, "first line", &magic, "NRRD0001 to NRRD0005"));
     }
-    let mut fields = Fields::new(path);
+    let mut fields = Fields::new(path, &KNOWN);
     let mut listed = Vec::new();
     while let Some(line) = lines.next_line()? {
-        if line.is_empty() {
+        let Line { text, .. } = &line;
+        if text.is_empty() {
             return Ok(Header { fields, listed });
         }
-        if line.starts_with('#') || is_pair(&line) {
+        if text.starts_with('#') || is_pair(text) {
             continue;
         }
-        let Some((key, value)) = line.split_once(':') else {
+        let Some((key, value)) = text.split_once(':') else {
             return Err(ReadError::header(
                 path,
                 "header line",
-                &line,
+                text,
                 "`field: value`, `key:=value` or `# comment`",
             ));
         };
-        fields.insert(key, value);
+        fields.insert(key, value, &line)?;
         let value = value.trim();
         if Fields::same(key, "data file") && (value == "LIST" || value.starts_with("LIST ")) {
-            while let Some(name) = lines.next_line()? {
-                if !name.trim().is_empty() {
-                    listed.push(name.trim().to_string());
-                }
-            }
+            listed = lines.names("data file")?;
         }
     }
     if fields.get(&["data file"]).is_none() {

@@ -8,7 +8,7 @@ mod tests;
 use super::detached;
 use super::error::ReadError;
 use super::fields::Fields;
-use super::layout::{Axis, Layout};
+use super::layout::{Axis, Layout, Samples};
 use super::sample_type::{Endian, SampleType};
 use super::stream::{self, Coding, Start, Stream};
 use super::{Loaded, Parsed};
@@ -28,7 +28,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
     let endian = endian(&fields, sample, text)?;
     let layout = Layout { text, ..Layout::new(path, "sizes", shape.axes.clone(), sample, endian)? };
     let data = Data { coding, skip: Skip::new(&fields)? };
-    let voxels = match fields.get(&["data file"]) {
+    let Samples { voxels, notes: found } = match fields.get(&["data file"]) {
         None => layout.read(path, data.open(path, file, layout.bytes())?)?,
         Some(value) => {
             let slowest = layout.axes.last().map_or(1, |(n, _)| *n);
@@ -39,7 +39,7 @@ pub(super) fn read(path: &Path) -> Result<Loaded, ReadError> {
         }
     };
     let (channels, times) = (layout.count(Axis::Channel), layout.count(Axis::Time));
-    let notes = shape.notes;
+    let notes = shape.notes.into_iter().chain(found).collect();
     Parsed { grid, voxels, values: ValueMap::IDENTITY, channels, times, notes }.load(path)
 }
 

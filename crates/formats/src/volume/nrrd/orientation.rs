@@ -158,14 +158,18 @@ fn directions(
     found.into_iter().map(to_world).collect::<Result<_, _>>().map(Some)
 }
 
-/// Vectors such as `(1,0,0) none (0, 2, 0)`.
+/// Vectors such as `(1,0,0) none (0, 2, 0)`; `(nan,nan,nan)` is none too.
 fn vectors(text: &str) -> Option<Vec<Option<Vec<f64>>>> {
     let mut found = Vec::new();
     let mut rest = text.trim_start();
     while !rest.is_empty() {
         if let Some(inside) = rest.strip_prefix('(') {
             let (numbers, after) = inside.split_once(')')?;
-            found.push(Some(numbers.split(',').map(|n| finite(n.trim())).collect::<Option<_>>()?));
+            let numbers: Vec<&str> = numbers.split(',').map(str::trim).collect();
+            // Some writers know no other word for an axis that is none of space.
+            let is_none = numbers.iter().all(|number| number.parse().is_ok_and(f64::is_nan));
+            let vector = || numbers.iter().map(|number| finite(number)).collect::<Option<_>>();
+            found.push(if is_none { None } else { Some(vector()?) });
             rest = after;
         } else {
             rest = rest.strip_prefix("none")?;
