@@ -28,7 +28,7 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
     let mut live = LiveSession::start(input, on).map_err(Failure::input)?;
     let writes = !options.outputs.is_empty();
     let plan = |live: &LiveSession| {
-        let samples = live.document().render.samples;
+        let samples = live.document().render.samples();
         Reserve::new(&Plan::of_session(&options.outputs, live, samples, false))
     };
     let mut reserve = writes.then(|| plan(&live)).transpose()?;

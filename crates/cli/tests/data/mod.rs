@@ -108,7 +108,7 @@ pub fn picture(folder: &Folder, name: &str, patch: &Value, way: Way) -> Image {
     });
     let patch = tyndall_live::document::apply(&small, patch);
     let mut live = open(folder, name, &patch, way.level);
-    live.refine(&Budget::samples(live.document().render.samples));
+    live.refine(&Budget::samples(live.document().render.samples()));
     live.image()
 }
 
