@@ -202,15 +202,14 @@ fn told_apart(document: &Document, volume: &Volume) -> Result<(), SceneError> {
         );
         fault(key, problem)
     };
-    let is_one = |values: &[f64]| values.iter().all(|&v| cast::single(v) == cast::single(values[0]));
-    let differ = |values: &[f64]| values.windows(2).all(|pair| pair[0] < pair[1]);
+    let is_one = |pair: &[f64]| cast::single(pair[0]) == cast::single(pair[1]);
     let given = document.transfer_function.as_ref();
     let values: Vec<f64> =
         given.and_then(|t| t.points.as_ref()).into_iter().flatten().map(|p| p.value).collect();
     // Two points that become one are a jump, which is what they were to be, unless there may be data between them.
-    let most = if volume.exceeds_single() { 1 } else { 2 };
-    if let Some(i) = values.windows(most + 1).position(|values| is_one(values) && differ(values)) {
-        return Err(refusal(&format!("transfer_function.points.{}.value", i + most), &values[i..=i + most]));
+    let mut pairs = values.windows(2).enumerate().filter(|_| volume.exceeds_single());
+    if let Some((i, pair)) = pairs.find(|(_, pair)| pair[0] < pair[1] && is_one(pair)) {
+        return Err(refusal(&format!("transfer_function.points.{}.value", i + 1), pair));
     }
     let preset = given.and_then(|t| t.preset.as_deref()).and_then(Preset::named);
     let labels = volume.whole_values().filter(|_| preset.is_some_and(Preset::shows_labels));

@@ -2,7 +2,7 @@
 
 use super::error::{DocumentError, Problem, Problems, join};
 use super::{Camera, Clip, Document, Film, Light, TransferPoint};
-use tyndall::math::DVec3;
+use tyndall::math::{DVec3, cast};
 
 /// Most pixels of a film; whether they fit in memory is checked later.
 const MOST_PIXELS: u64 = 1 << 28;
@@ -43,9 +43,14 @@ fn validate_points(points: &[TransferPoint], problems: &mut Problems) {
     }
     for (i, triple) in points.windows(3).enumerate() {
         let here = triple[2].value;
-        // Whether the renderer tells other values apart depends on the data.
-        if triple.iter().all(|point| point.value == here) {
-            let found = format!("a third point at {here}");
+        // As the renderer holds values: in single precision.
+        if triple.iter().all(|point| cast::single(point.value) == cast::single(here)) {
+            let [a, b] = [triple[0].value, triple[1].value];
+            let found = if a == here {
+                format!("a third point at {here}")
+            } else {
+                format!("{a}, {b} and {here}, which are one number in single precision")
+            };
             let problem = Problem::new(path(i + 2), found, "at most two points at one value (a jump)");
             problems.push(problem.with_fix("keep only the first and the last point at that value"));
         }

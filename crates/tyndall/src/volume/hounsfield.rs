@@ -5,21 +5,20 @@ use super::{Histogram, Space, Volume};
 /// Values that air may have: its mean is -1000, noise and calibration spread it.
 const AIR: [f64; 2] = [-1100.0, -900.0];
 
-/// Width of a bin, fine enough to tell a peak of air from matter that has all values.
-const BIN: f64 = 25.0;
-
 /// The histogram's ends: some bins below air, up to where bone is. Values beyond count in the end bins.
 const ENDS: [f64; 2] = [-1300.0, 700.0];
+
+/// Of 25 units each, fine enough to tell a peak of air from matter that has all values.
 const BINS: usize = 80;
 
 /// First bin of air and first bin past it.
 const AIR_BINS: [usize; 2] = [8, 16];
 
+/// The bins from -700 to -300, where there is least in a body: above lung and below fat.
+const SPARSE_BINS: std::ops::Range<usize> = 24..40;
+
 /// A value that only bone and contrast agent reach.
 const DENSE: f64 = 200.0;
-
-/// Values above this are metal, or not of the scan.
-const DENSEST: f64 = 3100.0;
 
 /// Whether a volume is a CT: it lies in anatomical space, has values denser than soft tissue, and its histogram has a peak of air at
 /// -1000 below which there is nothing but padding. A range of values alone tells little: seismic amplitudes, heights and phases
@@ -27,15 +26,15 @@ const DENSEST: f64 = 3100.0;
 pub(super) fn is_ct(volume: &Volume) -> bool {
     let [least, most] = volume.value_range();
     let may_be = volume.grid().space() == Space::Anatomical && least <= AIR[1] && most >= DENSE;
-    may_be && has_air(&volume.histogram(ENDS, BINS), most)
+    may_be && has_air(&volume.histogram(ENDS, BINS))
 }
 
-/// Whether there is a peak of air in a histogram over [`ENDS`] of data up to `most`.
-fn has_air(histogram: &Histogram, most: f64) -> bool {
+/// Whether there is a peak of air in a histogram over [`ENDS`].
+fn has_air(histogram: &Histogram) -> bool {
     /// Least share of air in the scan: a body that fills nearly all of the picture still has its airways.
     const LEAST_AIR: f64 = 0.005;
-    /// How much more often than the average value the commonest value of air occurs, at least.
-    const PEAK: f64 = 1.5;
+    /// How much more often the commonest value of air occurs than those where there is least, at least.
+    const PEAK: f64 = 2.0;
     /// Values below air occur at most as often as this share of those of air.
     const BELOW: f64 = 0.25;
 
@@ -43,10 +42,10 @@ fn has_air(histogram: &Histogram, most: f64) -> bool {
     let [first, past] = AIR_BINS;
     let (air, scan) = (sum(first..past), sum(first..BINS));
     let peak = histogram.counts[first..past].iter().copied().max().unwrap_or(0) as f64;
-    let average = scan * BIN / (most.min(DENSEST) - AIR[0]);
+    let sparse = sum(SPARSE_BINS) / SPARSE_BINS.len() as f64;
     // The first bin also holds the padding.
     let below = sum(1..first) * (past - first) as f64 / (first - 1) as f64;
-    air >= LEAST_AIR * scan && peak >= PEAK * average && below <= BELOW * air
+    air >= LEAST_AIR * scan && peak >= PEAK * sparse && below <= BELOW * air
 }
 
 #[cfg(test)]
