@@ -97,13 +97,16 @@ mod tests {
         assert!(!is_ct(&volume(Space::Plain, scan(15.0, 0.5, None))), "without an anatomical space");
     }
 
+    /// Values drawn from random numbers.
+    type Drawn = Box<dyn FnMut(&mut SplitMix) -> f64>;
+
     #[test]
     fn other_data_over_the_same_range_are_not() {
-        let of = |mut value: Box<dyn FnMut(&mut SplitMix) -> f64>| {
+        let of = |mut value: Drawn| {
             let mut random = SplitMix::new(3);
             volume(Space::Anatomical, move || value(&mut random))
         };
-        let kinds: [(&str, Box<dyn FnMut(&mut SplitMix) -> f64>); 7] = [
+        let kinds: [(&str, Drawn); 7] = [
             ("seismic", Box::new(|r| (700.0 * normal(r)).clamp(-3500.0, 3500.0))),
             ("weak seismic", Box::new(|r| 300.0 * normal(r))),
             ("strong seismic", Box::new(|r| (4000.0 * normal(r)).clamp(-3500.0, 3500.0))),

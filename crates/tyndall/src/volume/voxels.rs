@@ -117,7 +117,7 @@ impl Voxels {
     pub(super) fn unmend(&mut self, filler: f64) {
         match self {
             Self::F32(data) => {
-                data.iter_mut().filter(|v| f64::from(**v) == filler).for_each(|v| *v = f32::NAN)
+                data.iter_mut().filter(|v| f64::from(**v) == filler).for_each(|v| *v = f32::NAN);
             }
             Self::F64(data) => data.iter_mut().filter(|v| **v == filler).for_each(|v| *v = f64::NAN),
             _ => {}
