@@ -212,7 +212,7 @@ fn told_apart(document: &Document, volume: &Volume) -> Result<(), SceneError> {
         return Err(refusal(&format!("transfer_function.points.{}.value", i + 1), pair));
     }
     let preset = given.and_then(|t| t.preset.as_deref()).and_then(Preset::named);
-    let labels = volume.whole_values().filter(|_| preset.is_some_and(Preset::shows_labels));
+    let labels = preset.filter(|preset| preset.shows_labels()).and_then(|_| volume.whole_values());
     match labels.and_then(|labels| labels.windows(2).find(|pair| is_one(pair))) {
         Some(pair) => Err(refusal("transfer_function.preset", pair)),
         None => Ok(()),

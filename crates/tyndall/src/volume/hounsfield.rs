@@ -97,21 +97,23 @@ mod tests {
         assert!(!is_ct(&volume(Space::Plain, scan(15.0, 0.5, None))), "without an anatomical space");
     }
 
+    /// Values drawn from random numbers.
+    type Drawn = Box<dyn FnMut(&mut SplitMix) -> f64>;
+
     #[test]
     fn other_data_over_the_same_range_are_not() {
-        type Value = fn(&mut SplitMix) -> f64;
-        let of = |value: Value| {
+        let of = |mut value: Drawn| {
             let mut random = SplitMix::new(3);
             volume(Space::Anatomical, move || value(&mut random))
         };
-        let kinds: [(&str, Value); 7] = [
-            ("seismic", |r| (700.0 * normal(r)).clamp(-3500.0, 3500.0)),
-            ("weak seismic", |r| 300.0 * normal(r)),
-            ("strong seismic", |r| (4000.0 * normal(r)).clamp(-3500.0, 3500.0)),
-            ("phase", |r| (r.uniform() * 8192.0 - 4096.0).round()),
-            ("heights", |r| r.uniform() * 4000.0 - 1000.0),
-            ("depths", |r| -11_000.0 + 19_000.0 * r.uniform().sqrt()),
-            ("a mirrored scan", |r| if r.uniform() < 0.5 { 1000.0 } else { -600.0 * r.uniform() }),
+        let kinds: [(&str, Drawn); 7] = [
+            ("seismic", Box::new(|r| (700.0 * normal(r)).clamp(-3500.0, 3500.0))),
+            ("weak seismic", Box::new(|r| 300.0 * normal(r))),
+            ("strong seismic", Box::new(|r| (4000.0 * normal(r)).clamp(-3500.0, 3500.0))),
+            ("phase", Box::new(|r| (r.uniform() * 8192.0 - 4096.0).round())),
+            ("heights", Box::new(|r| r.uniform() * 4000.0 - 1000.0)),
+            ("depths", Box::new(|r| -11_000.0 + 19_000.0 * r.uniform().sqrt())),
+            ("a mirrored scan", Box::new(|r| if r.uniform() < 0.5 { 1000.0 } else { -600.0 * r.uniform() })),
         ];
         for (name, value) in kinds {
             assert!(!is_ct(&of(value)), "{name}");

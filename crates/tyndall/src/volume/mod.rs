@@ -8,6 +8,7 @@ mod bricks;
 mod cells;
 mod grid;
 mod hounsfield;
+mod kind;
 mod labels;
 mod lanes;
 mod statistics;
@@ -257,31 +258,6 @@ impl Volume {
         ValueBins::new([(lo - bin).max(f32::MIN), (hi + bin).min(f32::MAX)])
     }
 
-    /// Whether data may have values that single precision, in which they are read, does not tell apart: whole numbers beyond 2^24, or
-    /// numbers in double precision that are close together for their size.
-    #[must_use]
-    pub fn exceeds_single(&self) -> bool {
-        /// The largest whole number up to which single precision holds all.
-        const WHOLE: f64 = 16_777_216.0;
-        /// Steps of single precision across the range, at least, so that data are seen as they are.
-        const STEPS: f64 = 4096.0;
-
-        let [lo, hi] = self.value_range;
-        let most = lo.abs().max(hi.abs());
-        let are_whole = lo.fract() == 0.0 && hi.fract() == 0.0 && self.whole_values().is_some();
-        match self.bricks.samples() {
-            Voxels::U32(_) | Voxels::I32(_) => most > WHOLE,
-            Voxels::F64(_) => {
-                if are_whole {
-                    most > WHOLE
-                } else {
-                    hi > lo && most > (hi - lo) * (WHOLE / STEPS)
-                }
-            }
-            _ => false,
-        }
-    }
-
     /// How many samples were NaN or infinite in the file.
     #[must_use]
     pub fn non_finite(&self) -> u64 {
@@ -299,13 +275,6 @@ impl Volume {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.mended.nan == self.grid.len() as u64
-    }
-
-    /// The value of all samples with data, if it is the same; `None` without data.
-    #[must_use]
-    pub fn only_value(&self) -> Option<f64> {
-        let [least, most] = self.value_range;
-        (least == most && !self.is_empty()).then_some(least)
     }
 
     /// The data value below which nothing that is read is data, if there are samples without data: their opacity is 0.
@@ -358,43 +327,6 @@ impl Volume {
         /// Fine enough to set a threshold, coarse enough for every bin to mean something.
         const BINS: usize = 256;
         self.statistics.robust.get_or_init(|| self.histogram(self.robust_range, BINS))
-    }
-
-    /// Whether the data are computed tomography in Hounsfield units: they lie in anatomical space and have a peak of air at
-    /// -1000.
-    #[must_use]
-    pub fn is_ct(&self) -> bool {
-        *self.statistics.is_ct.get_or_init(|| hounsfield::is_ct(self))
-    }
-
-    /// The values other than 0, ascending, of data of whole numbers from 0; `None` if there are other numbers, or more than 200 of these.
-    #[must_use]
-    pub fn whole_values(&self) -> Option<&[f64]> {
-        self.statistics.whole_values.get_or_init(|| labels::whole_values(self)).as_deref()
-    }
-
-    /// The labels, ascending, of a segmentation: [`Self::whole_values`], at least two, of parts that most voxels lie inside of.
-    #[must_use]
-    pub fn labels(&self) -> Option<&[f64]> {
-        let values = self.whole_values()?;
-        let are_labels = *self.statistics.are_labels.get_or_init(|| labels::are_labels(self, values));
-        are_labels.then_some(values)
-    }
-
-    /// Folds over all data values, each once, in parallel on the current pool.
-    fn fold_data<A: Send>(
-        &self,
-        start: impl Fn() -> A + Sync + Send,
-        take: impl Fn(&mut A, f64) + Sync + Send,
-        merge: impl Fn(A, A) -> A + Sync + Send,
-    ) -> A {
-        let filler = self.filler();
-        let take = |sum: &mut A, stored: f64| {
-            if filler != Some(stored) {
-                take(sum, self.values.apply(stored));
-            }
-        };
-        self.bricks.fold(start, take, merge)
     }
 
     /// The histogram over the inner [`ValueBins`], all but the outermost two.
