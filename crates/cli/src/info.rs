@@ -6,7 +6,6 @@ use crate::{Failure, say};
 use serde_json::json;
 use std::fmt::Write;
 use tyndall::message::sentence;
-use tyndall::transfer::Preset;
 use tyndall::volume::procedural::MATERIALS;
 use tyndall::volume::{Space, Volume};
 use tyndall_live::document::FieldKind;
@@ -58,9 +57,14 @@ fn to_json(loaded: &LoadedScene) -> serde_json::Value {
         "times": source.times,
         "non_finite": volume.non_finite(),
         "no_data": volume.no_data(),
-        "preset": Preset::for_volume(volume).name,
+        "preset": preset(loaded),
         "notes": source.notes,
     })
+}
+
+/// The preset that the scene names, or that was chosen for its data.
+fn preset(loaded: &LoadedScene) -> Option<&str> {
+    loaded.document.transfer_function.as_ref()?.preset.as_deref()
 }
 
 fn corner([x, y, z]: [f64; 3]) -> String {
@@ -84,6 +88,11 @@ fn as_text(loaded: &LoadedScene) -> String {
     let [robust_lo, robust_hi] = volume.robust_range();
     let corners = grid.file_bounds();
     let size = grid.file_extent();
+    let values = if volume.is_empty() {
+        "none, all are NaN".to_owned()
+    } else {
+        format!("{lo} to {hi}; without outliers {robust_lo} to {robust_hi}")
+    };
     let mut text = format!(
         "voxels     {nx} x {ny} x {nz} of {}\n\
          spacing    {sx} x {sy} x {sz}\n\
@@ -92,7 +101,7 @@ fn as_text(loaded: &LoadedScene) -> String {
          origin     {ox}, {oy}, {oz}\n\
          direction  {:?}\n\
          space      {}\n\
-         values     {lo} to {hi}; without outliers {robust_lo} to {robust_hi}\n\
+         values     {values}\n\
          channels   {}, time steps {}\n\
          preset     {}\n",
         volume.type_name(),
@@ -105,13 +114,13 @@ fn as_text(loaded: &LoadedScene) -> String {
         space(volume),
         source.channels,
         source.times,
-        Preset::for_volume(volume).name,
+        preset(loaded).unwrap_or("none: the scene gives points"),
     );
     if let Some(range) = loaded.document.medium.gradient_range {
-        let _ = writeln!(text, "gradients  measured against a range of {range}");
+        let _ = writeln!(text, "gradients  divided by a range of {range}");
     }
     if volume.non_finite() > 0 {
-        let how = "NaN is no data, an infinity is read as the value nearest to it";
+        let how = "NaN is no data, infinities are read as the nearest end of the range";
         let _ = writeln!(text, "not finite {} samples; {how}", volume.non_finite());
     }
     for note in &source.notes {

@@ -46,10 +46,10 @@ fn check_replaceable(path: &Path, input: &Path) -> Result<(), Failure> {
     } else if matches!(read_metadata(path), Ok(Some(_))) {
         return Ok(());
     } else {
-        "exists, and Tyndall did not make it"
+        "was not made by Tyndall"
     };
     Err(Failure::usage(format!(
-        "`{name}` {found}: it is not replaced unless asked for; name the picture with -o"
+        "`{name}` {found}, and is not replaced without -o; name the picture with -o FILE"
     )))
 }
 

@@ -60,26 +60,28 @@ impl Reserve {
         let Plan { paths, size, state, work, threads } = *plan;
         let pixels = u64::from(size[0]) * u64::from(size[1]);
         let writing = paths.iter().map(|path| bytes_to_write(path, pixels, state)).max().unwrap_or(0);
-        let too_little = |available: u64| {
+        let too_little = |available: Option<u64>| {
             let [width, height] = size;
+            let (need, writing) = (work.saturating_add(writing) >> 20, writing >> 20);
+            let free = available.map_or(", more than is free".to_owned(), |bytes| {
+                format!(", but {} MiB are free", bytes >> 20)
+            });
             Failure::input(format!(
-                "film.size: {width} x {height} pixels need {} MiB, {} of them to write the picture, but {} MiB are free; expected a smaller picture",
-                work.saturating_add(writing) >> 20,
-                writing >> 20,
-                available >> 20
+                "film.size: a picture of {width} x {height} needs {need} MiB, {writing} of them to write it{free}; expected a smaller picture or \
+                 fewer samples, or a higher limit of memory"
             ))
         };
         if let Some(available) = available().filter(|&available| work.saturating_add(writing) > available) {
-            return Err(too_little(available));
+            return Err(too_little(Some(available)));
         }
-        let memory = space(writing).ok_or_else(|| too_little(available().unwrap_or(0)))?;
+        let memory = space(writing).ok_or_else(|| too_little(None))?;
         // Whether there is also room for the work.
         let beside = SPACE_PER_THREAD.saturating_mul(threads as u64 + 1);
         if space(work.saturating_add(beside)).is_some() {
             return Ok(Self(memory));
         }
         drop(memory);
-        Err(too_little(available().unwrap_or(0).saturating_sub(beside)))
+        Err(too_little(available().map(|available| available.saturating_sub(beside))))
     }
 }
 

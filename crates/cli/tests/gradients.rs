@@ -74,7 +74,7 @@ fn the_range_can_be_set_and_is_stated() {
     let report = parse(&run(&folder, &["info", "../ct.nrrd", "--json"]));
     assert_eq!(report["gradient_range"], 2600.0, "{report}");
     let text = String::from_utf8(run(&folder, &["info", "../other.nrrd"])).expect("UTF-8");
-    assert!(text.contains("gradients  measured against a range of 1900"), "{text}");
+    assert!(text.contains("gradients  divided by a range of 1900"), "{text}");
     run(&folder, &["render", "../ct.nrrd", "--size", "8x8", "--samples", "1", "-o", "a.png"]);
     assert_eq!(scene_of(&folder, "a.png")["medium"]["gradient_range"], 2600.0);
 }

@@ -134,7 +134,7 @@ fn data_without_labels_refuse_the_preset_by_name() {
     folder.put("a.nrrd", smooth.nrrd("float"));
     let ended = folder.run(&["render", "../a.nrrd", "--preset", "labels", "--size", "8x8"]);
     assert_eq!(ended.status, Some(1), "{}", ended.stderr);
-    assert!(ended.stderr.contains("`labels` needs data of 1 to 200 whole numbers"), "{}", ended.stderr);
+    assert!(ended.stderr.contains("`labels` needs 1 to 200 different whole numbers"), "{}", ended.stderr);
     // A mask of a single part has no automatic labels, but one can ask for them.
     let mask = Data::new(8, |[x, ..]| f64::from(u8::from(x > 0.0)));
     folder.put("a.nrrd", mask.nrrd("uchar"));

@@ -236,7 +236,7 @@ fn raw(dims: [usize; 3], dtype: SampleType, offset: u64) -> RawLayout {
 /// The only note, which names the sizes found and stated.
 fn surplus(notes: &[String], found: &str, stated: &str, what: &str) {
     let [note] = notes else { panic!("{what}: {notes:?}") };
-    let expected = format!("found {found} of samples where {stated} are stated");
+    let expected = format!("found {found} of sample data where {stated} are stated");
     assert!(note.contains(&expected), "{what}: {note}");
 }
 

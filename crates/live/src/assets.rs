@@ -188,16 +188,18 @@ fn of_values(volume: &Volume) -> Vec<String> {
     if volume.no_data() > 0 {
         let count = volume.no_data();
         notes.push(format!(
-            "{count} samples are NaN, which is no data: nothing is seen up to the samples beside them"
+            "{count} samples are NaN, which is no data: they are invisible, as is the space up to their neighbours"
         ));
     }
     if volume.exceeds_single() {
         let [lo, hi] = volume.value_range();
-        let what = "values are read in single precision, and those that it does not tell apart count as one";
+        let what = "they lose precision, and values that are equal in single precision count as one";
         notes.push(format!("the data are from {lo} to {hi}: {what}"));
     }
     if let Some(value) = volume.only_value() {
-        notes.push(format!("every sample is {value}: the volume is background or one solid block"));
+        notes.push(format!(
+            "every sample is {value}: presets show nothing where that is background, and else one solid block"
+        ));
     }
     notes
 }

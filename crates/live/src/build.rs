@@ -197,8 +197,8 @@ fn told_apart(document: &Document, volume: &Volume) -> Result<(), SceneError> {
     let refusal = |key: &str, values: &[f64]| {
         let values = values.iter().map(f64::to_string).collect::<Vec<_>>().join(" and ");
         let problem = format!(
-            "{values} are one number in single precision, in which volumes are rendered; expected values that can be told apart: \
-             number the data from a smaller number"
+            "{values} are the same number in single precision, in which volumes are rendered; expected values that differ there: \
+             subtract an offset from the data, or number the labels anew"
         );
         fault(key, problem)
     };

@@ -22,11 +22,11 @@ pub(crate) fn state(document: &mut Document, volume: &Volume) {
     let shows_labels = preset.is_some_and(Preset::shows_labels);
     let usual = if shows_labels { Interpolation::Nearest } else { Interpolation::Linear };
     document.volume.interpolation.get_or_insert(usual);
-    let by_kind = || if volume.is_ct() { Some(CT_GRADIENT_RANGE) } else { robust_range(volume) };
+    let by_kind = || if volume.is_ct() { Some(CT_GRADIENT_RANGE) } else { robust_width(volume) };
     document.medium.gradient_range = document.medium.gradient_range.or_else(by_kind);
 }
 
 /// The width of the robust range, against which versions that did not state it measured all gradients; `None` for data of a single value.
-pub(crate) fn robust_range(volume: &Volume) -> Option<f32> {
+pub(crate) fn robust_width(volume: &Volume) -> Option<f32> {
     Some(volume.robust_width()).filter(|&width| width > 0.0)
 }

@@ -21,7 +21,7 @@ pub struct Input {
     /// Whether the input is a volume without a scene, whose look is then chosen automatically.
     pub bare: bool,
     /// Whether the input is a picture of a version that did not state against what it measured gradients.
-    pub robust_gradients: bool,
+    pub lacks_gradient_range: bool,
     /// Its name in messages.
     pub name: String,
     /// Notes for the user on how it was read.
@@ -77,10 +77,10 @@ impl Input {
             _ => (of_volume(path)?, true),
         };
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        let robust_gradients =
+        let lacks_gradient_range =
             PICTURES.contains(&extension.as_str()) && value.pointer(GRADIENT_RANGE).is_none();
         let mut input =
-            Self { value, folder, bare, robust_gradients, name: path_name(path), notes: Vec::new() };
+            Self { value, folder, bare, lacks_gradient_range, name: path_name(path), notes: Vec::new() };
         input.notes = in_file(path, document::move_old_keys(&mut input.value))?;
         Ok(input)
     }
@@ -89,7 +89,7 @@ impl Input {
     #[must_use]
     pub fn of_document(value: Value, folder: &Path) -> Self {
         let (folder, name) = (folder.to_owned(), "scene".to_owned());
-        Self { value, folder, bare: false, robust_gradients: false, name, notes: Vec::new() }
+        Self { value, folder, bare: false, lacks_gradient_range: false, name, notes: Vec::new() }
     }
 
     /// Applies a merge patch to the document.
@@ -119,13 +119,13 @@ impl Input {
     /// # Errors
     /// [`LiveError`] if the document or one of the files is invalid.
     pub fn load(self, options: &Options) -> Result<LoadedScene, LiveError> {
-        let Self { mut value, folder, bare, robust_gradients, name, mut notes } = self;
+        let Self { mut value, folder, bare, lacks_gradient_range, name, mut notes } = self;
         let in_document = |source| LiveError::Document { at: name.clone(), source };
         notes.extend(document::move_old_keys(&mut value).map_err(in_document)?);
         let density_is_free = bare && value.pointer("/medium/density").is_none();
         let kept = if options.edits { value.clone() } else { Value::Null };
         let mut document = Document::from_value(value).map_err(in_document)?;
-        let range_is_free = robust_gradients && document.medium.gradient_range.is_none();
+        let range_is_free = lacks_gradient_range && document.medium.gradient_range.is_none();
         let (assets, source) = options
             .threads
             .install(|| assets::load(&mut document, &folder))
@@ -139,7 +139,7 @@ impl Input {
             }
         }
         if range_is_free {
-            document.medium.gradient_range = chosen::robust_range(&assets.volume);
+            document.medium.gradient_range = chosen::robust_width(&assets.volume);
             if options.edits
                 && let Some(range) = document.medium.gradient_range
             {

@@ -56,8 +56,11 @@ impl<'a> Lines<'a> {
         let (mut names, path) = (Vec::new(), self.path);
         while let Some(Line { text, is_cut }) = self.next_line()? {
             let name = text.trim();
-            if is_cut || names.len() == MOST_FILES {
-                let expected = format!("at most {MOST_FILES} names of files, one a line");
+            if is_cut {
+                return Err(ReadError::header(path, key, name, "one file name a line, each under 64 KiB"));
+            }
+            if names.len() == MOST_FILES {
+                let expected = format!("at most {MOST_FILES} names of files, of which this is one more");
                 return Err(ReadError::header(path, key, name, &expected));
             }
             if !name.is_empty() {

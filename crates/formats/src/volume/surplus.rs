@@ -40,7 +40,7 @@ impl Surplus {
             _ => return,
         };
         let what = format!(
-            "found {found} of samples where {stated} are stated: the rest was left out; check the sizes and the type of the samples"
+            "found {found} of sample data where {stated} are stated: the rest was ignored; check the dimensions and the type of the samples"
         );
         self.0.borrow_mut().push(Found { file: file.into(), what });
     }
@@ -48,8 +48,7 @@ impl Surplus {
     /// Notes that bytes follow the compressed data, if there are some.
     pub fn behind(&self, file: &Path, bytes: u64) {
         if bytes > 0 {
-            let what =
-                format!("{bytes} bytes behind the compressed data are no part of it: they were ignored");
+            let what = format!("{bytes} bytes after the end of the compressed data were ignored");
             self.0.borrow_mut().push(Found { file: file.into(), what });
         }
     }

@@ -17,7 +17,7 @@ use super::shape::{Samples, ScatteringOrder};
 pub struct Render {
     /// Keeps light that scattered at most this many times.
     pub max_scatter: u32,
-    /// Samples per pixel at which rendering stops; `None` for as many as the method usually takes, see [`Self::samples`].
+    /// Samples per pixel at which rendering stops; `None` for the method's default, see [`Self::samples`].
     pub given_samples: Option<u32>,
     /// Seed of the random numbers.
     pub seed: u64,
@@ -45,7 +45,7 @@ impl Render {
     /// Samples per pixel at which rendering stops.
     #[must_use]
     pub fn samples(&self) -> u32 {
-        self.given_samples.unwrap_or(self.entry().usual_samples)
+        self.given_samples.unwrap_or(self.entry().default_samples)
     }
 
     /// The entry of the method that is used in the list of methods.
@@ -142,7 +142,7 @@ impl JsonSchema for Render {
         let mut schema = Common::json_schema(generator);
         if let Some(samples) = schema.pointer_mut("/properties/samples/description") {
             *samples =
-                format!("Samples per pixel at which rendering stops; when omitted, {}.", usual_samples())
+                format!("Samples per pixel at which rendering stops; when omitted, {}.", default_samples())
                     .into();
         }
         for entry in METHODS {
@@ -158,11 +158,11 @@ impl JsonSchema for Render {
     }
 }
 
-/// The usual number of samples, and the methods that take another.
-fn usual_samples() -> String {
-    let usual = DEFAULT_METHOD.usual_samples;
-    let others = METHODS.iter().filter(|entry| entry.usual_samples != usual);
-    let others = others.map(|entry| format!(", {} for `{}`", entry.usual_samples, entry.name));
+/// The default number of samples, and the methods that have another.
+fn default_samples() -> String {
+    let usual = DEFAULT_METHOD.default_samples;
+    let others = METHODS.iter().filter(|entry| entry.default_samples != usual);
+    let others = others.map(|entry| format!(", {} for `{}`", entry.default_samples, entry.name));
     others.fold(usual.to_string(), |text, other| text + &other)
 }
 

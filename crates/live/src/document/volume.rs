@@ -22,7 +22,7 @@ pub struct Volume {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub procedural: Option<Procedural>,
 
-    /// How the field is interpolated between voxel centres; when omitted, nearest for labels and linear for other data.
+    /// How the field is interpolated between voxel centres; when omitted, nearest with the preset `labels` and linear otherwise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interpolation: Option<Interpolation>,
 

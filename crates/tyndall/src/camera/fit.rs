@@ -26,8 +26,7 @@ impl AutoView {
     }
 }
 
-/// Where an automatic camera stands that was left to choose, with its picture's up: what is before it is the front, and lights come from
-/// there too.
+/// The default viewpoint, and the front and up directions that it and the default lights use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AutoFront {
     /// The view.

@@ -105,8 +105,8 @@ pub struct MethodEntry {
     pub about: &'static str,
     /// See [`Method::HAS_NOISE`].
     pub has_noise: bool,
-    /// See [`Method::USUAL_SAMPLES`].
-    pub usual_samples: u32,
+    /// See [`Method::DEFAULT_SAMPLES`].
+    pub default_samples: u32,
     /// See [`Method::MOVED_KEYS`].
     pub moved_keys: &'static [MovedKey],
     default_settings: fn() -> MethodChoice,
@@ -128,7 +128,7 @@ impl MethodEntry {
             name: M::NAME,
             about: M::ABOUT,
             has_noise: M::HAS_NOISE,
-            usual_samples: M::USUAL_SAMPLES,
+            default_samples: M::DEFAULT_SAMPLES,
             moved_keys: M::MOVED_KEYS,
             default_settings: M::usual,
             schema: |generator| generator.subschema_for::<M::Settings>(),

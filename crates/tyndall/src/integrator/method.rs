@@ -26,7 +26,7 @@ pub trait Method: Sized + Send + Sync + 'static {
     const HAS_NOISE: bool = true;
 
     /// Samples per pixel of a document that gives no number.
-    const USUAL_SAMPLES: u32 = 64;
+    const DEFAULT_SAMPLES: u32 = 64;
 
     /// Whether light bends where the refractive index changes; if not, a note says that a scene's index is ignored.
     const BENDS_LIGHT: bool = false;

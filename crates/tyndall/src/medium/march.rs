@@ -247,8 +247,7 @@ impl Track {
         Steps::new(self, step).count
     }
 
-    /// The same track, of whose steps a march takes each sample elsewhere than in the middle: by the share `by` of the step's width,
-    /// -1/2 to 1/2, farther on.
+    /// The same track, with each sample of a march moved from the middle of its step by the share `by` of the step's width, -1/2 to 1/2.
     #[must_use]
     pub fn shifted(&self, by: f32) -> Self {
         Self { shift: by, ..*self }

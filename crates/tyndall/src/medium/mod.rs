@@ -74,7 +74,7 @@ pub struct Track {
     length: f32,
     /// World distance before it.
     before: f32,
-    /// World distance from the middle of each step to where a march takes its sample.
+    /// Offset of each sample of a march from the middle of its step, as a share of the step's width: -1/2 to 1/2.
     shift: f32,
 }
 

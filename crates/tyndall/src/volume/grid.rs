@@ -255,7 +255,7 @@ impl Grid {
         )
     }
 
-    /// The voxel size in a unit of length, a power of two, of about that size: from 1 to 2.
+    /// The voxel size divided by the power of two below it: 1 to 2.
     #[inline]
     pub(crate) fn scaled_voxel_size(&self) -> f32 {
         self.scaled_voxel_size

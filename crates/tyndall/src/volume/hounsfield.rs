@@ -33,7 +33,7 @@ pub(super) fn is_ct(volume: &Volume) -> bool {
 fn has_air(histogram: &Histogram) -> bool {
     /// Least share of air in the scan: a body that fills nearly all of the picture still has its airways.
     const LEAST_AIR: f64 = 0.005;
-    /// How much more often the commonest value of air occurs than those where there is least, at least.
+    /// Least ratio of the peak of air to the mean count of the sparse bins.
     const PEAK: f64 = 2.0;
     /// Values below air occur at most as often as this share of those of air.
     const BELOW: f64 = 0.25;

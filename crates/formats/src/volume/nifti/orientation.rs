@@ -24,7 +24,7 @@ pub(super) fn grid(path: &Path, header: &Header, notes: &mut Vec<String>) -> Res
     let sform = (header.sform_code > 0).then_some(header.sform);
     let qform = (header.qform_code > 0).then(|| by_quaternion(header));
     let [of_sform, of_qform] = [sform, qform].map(|rows| rows.and_then(|rows| placed(&rows).ok()));
-    let unusable = |name: &str, code: i32| format!("its {name} (code {code}) is singular or not finite: ");
+    let unusable = |name: &str, code: i32| format!("the {name} (code {code}) is singular or not finite: ");
     if let Some(grid) = of_sform {
         if sform.zip(qform).is_some_and(|(sform, qform)| differ(&sform, &qform, dims)) {
             notes.push("sform and qform disagree: the sform was used".into());
@@ -47,7 +47,7 @@ pub(super) fn grid(path: &Path, header: &Header, notes: &mut Vec<String>) -> Res
     if found.is_empty() {
         found.push_str("no sform and no qform: ");
     }
-    notes.push(found + "centred, with left and right as in Analyze (index x runs to the left)");
+    notes.push(found + "the volume was centred, with index x running to the left as in Analyze files");
     placed(&by_size(header, dims))
 }
 

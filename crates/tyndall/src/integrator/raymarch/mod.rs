@@ -19,7 +19,7 @@ impl Method for RayMarch {
     const ABOUT: &'static str = "Ray marching with shadow rays: emission, absorption and single scattering; deterministic, fast and flat.";
     const HAS_NOISE: bool = false;
     // They only smooth edges.
-    const USUAL_SAMPLES: u32 = 4;
+    const DEFAULT_SAMPLES: u32 = 4;
 
     type Settings = Settings;
     /// A packet that a stop left unfinished.

@@ -36,8 +36,8 @@ enum Points {
 pub enum PresetError {
     /// The data are not whole numbers, or too many.
     #[error(
-        "`labels` needs data of 1 to 200 whole numbers above 0, besides 0; these have other or more values: use `layers` or \
-         `cloud`, or give points"
+        "`labels` needs 1 to 200 different whole numbers above 0, and 0 as background; these data have fractions, negative or more \
+         values, or only 0: use `layers` or `cloud`, or give points"
     )]
     NoLabels,
 }
