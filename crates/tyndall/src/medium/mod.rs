@@ -11,6 +11,7 @@ mod march_notes;
 mod marched_flight;
 mod skip;
 
+pub(crate) use clip::HalfSpace;
 pub use clip::{Clip, ClipShape};
 pub use free_flight::Collision;
 pub(crate) use free_flight::FlightNotes;
@@ -249,11 +250,18 @@ impl Medium {
     #[inline]
     #[must_use]
     pub fn event(&self, p: Vec3, optics: &Optics) -> Event {
+        let gradient = if optics.surface > 0.0 { self.volume.gradient(p) } else { Vec3::ZERO };
+        self.event_with(optics, gradient)
+    }
+
+    /// [`Self::event`] where the data's gradient per world unit is known; it matters only where `optics` has a surface.
+    #[inline(always)]
+    #[must_use]
+    pub(crate) fn event_with(&self, optics: &Optics, gradient: Vec3) -> Event {
         let surface =
             Surface { albedo: optics.albedo, specular: optics.specular, roughness: optics.roughness };
         let mut event = Event { phase: self.phase, brdf: self.brdf, surface, normal: None, q: 0.0 };
         if optics.surface > 0.0 {
-            let gradient = self.volume.gradient(p);
             let length = gradient.length();
             let [lo, hi] = self.volume.robust_range();
             let range = cast::single(hi - lo);

@@ -1,6 +1,7 @@
 //! Where the voxels are: dimensions and the map between index space and the world.
 
 use crate::math::{Affine3A, Bounds, DMat3, DVec3, Mat3, Ray, Vec3, cast};
+use crate::simd::Lanes;
 
 /// Which way is up, and what the axes mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -247,11 +248,25 @@ impl Grid {
         )
     }
 
+    /// A world direction in index space, scaled so that distances along it are those of the world.
+    #[inline]
+    #[must_use]
+    pub fn direction_to_index(&self, direction: Vec3) -> Vec3 {
+        self.world_to_index.transform_vector3(direction)
+    }
+
     /// A gradient per index unit turned into one per world unit (inverse transpose).
     #[inline]
     #[must_use]
     pub fn gradient_to_world(&self, g: Vec3) -> Vec3 {
         self.gradient_to_world * g
+    }
+
+    /// [`Self::gradient_to_world`] of a gradient per lane.
+    #[inline(always)]
+    pub(super) fn gradient_to_world_lanes<S: Lanes>(&self, [x, y, z]: [S::f32s; 3]) -> [S::f32s; 3] {
+        let [a, b, c] = [self.gradient_to_world.x_axis, self.gradient_to_world.y_axis, self.gradient_to_world.z_axis];
+        [x * a.x + y * b.x + z * c.x, x * a.y + y * b.y + z * c.y, x * a.z + y * b.z + z * c.z]
     }
 }
 

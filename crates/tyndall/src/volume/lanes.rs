@@ -29,6 +29,17 @@ impl Volume {
         stored * self.slope + self.intercept
     }
 
+    /// [`Volume::gradient`] at a position per lane.
+    #[inline(always)]
+    pub(crate) fn gradient_lanes<S: Lanes>(&self, simd: S, [x, y, z]: [S::f32s; 3]) -> [S::f32s; 3] {
+        let g = [
+            self.value_lanes(simd, [x + 0.5, y, z]) - self.value_lanes(simd, [x - 0.5, y, z]),
+            self.value_lanes(simd, [x, y + 0.5, z]) - self.value_lanes(simd, [x, y - 0.5, z]),
+            self.value_lanes(simd, [x, y, z + 0.5]) - self.value_lanes(simd, [x, y, z - 0.5]),
+        ];
+        self.grid.gradient_to_world_lanes::<S>(g)
+    }
+
     #[inline(always)]
     fn stored_lanes<S: Lanes, T: Pair>(&self, simd: S, samples: &[T], [x, y, z]: [S::f32s; 3]) -> S::f32s {
         let lattice = &self.lattice;
