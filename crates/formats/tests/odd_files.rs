@@ -104,7 +104,7 @@ fn what_follows_compressed_samples_is_no_damage() {
             let what = format!("{name} and {} bytes", tail.len());
             let notes = notes(&path, &[&file[..], tail].concat(), &what);
             let [note] = &notes[..] else { panic!("{what}: {notes:?}") };
-            let expected = format!("{} bytes behind the compressed data", tail.len());
+            let expected = format!("{} bytes after the end of the compressed data", tail.len());
             assert!(note.contains(&expected) && note.contains(name), "{what}: {note}");
         }
     }
@@ -119,7 +119,7 @@ fn data_files_beside_a_header_may_have_tails_too() {
     let header = String::from_utf8(nrrd("gzip", &[])).expect("text").trim_end().to_owned();
     let notes = notes(&folder.join("a.nhdr"), format!("{header}\ndata file: %d.gz 0 1\n").as_bytes(), "two");
     let [note] = &notes[..] else { panic!("{notes:?}") };
-    assert!(note.contains("0.gz and 1 other file: 1 bytes behind"), "{note}");
+    assert!(note.contains("0.gz and 1 other file: 1 bytes after"), "{note}");
 }
 
 /// Sizes of headers with tracked frames or segmentations, which other programs write and read.
