@@ -1,29 +1,13 @@
 //! Damaged files of every kind give an error or a volume: no panic, no endless loop, no more memory than
 //! the file justifies. The damage is the same in every run.
 
-use flate2::{Compression, write::GzEncoder, write::ZlibEncoder};
-use std::io::Write;
+use compressed::{bzip2, gzip, zlib};
 use std::path::Path;
 use tyndall_formats::volume::{Endian, RawLayout, SampleType, read, read_raw};
 use tyndall_testing::within_limits;
 
-fn gzip(data: &[u8]) -> Vec<u8> {
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
-    encoder.write_all(data).expect("writing to memory");
-    encoder.finish().expect("writing to memory")
-}
-
-fn zlib(data: &[u8]) -> Vec<u8> {
-    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    encoder.write_all(data).expect("writing to memory");
-    encoder.finish().expect("writing to memory")
-}
-
-fn bzip2(data: &[u8]) -> Vec<u8> {
-    let mut encoder = bzip2::write::BzEncoder::new(Vec::new(), bzip2::Compression::fast());
-    encoder.write_all(data).expect("writing to memory");
-    encoder.finish().expect("writing to memory")
-}
+#[path = "valid/compressed.rs"]
+mod compressed;
 
 /// 4 x 3 x 2 samples of two bytes.
 fn samples() -> Vec<u8> {

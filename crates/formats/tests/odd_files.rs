@@ -2,9 +2,8 @@
 //! was left out.
 
 use common::folder;
-use flate2::{Compression, write::GzEncoder, write::ZlibEncoder};
+use compressed::{bzip2, gzip, zlib};
 use std::fs;
-use std::io::Write;
 use std::path::Path;
 use tyndall::volume::Voxels;
 use tyndall_formats::volume::{Endian, Loaded, RawLayout, ReadError, SampleType, read, read_raw};
@@ -12,24 +11,8 @@ use tyndall_testing::within_limits;
 
 #[allow(dead_code, reason = "each file of tests uses what it needs")]
 mod common;
-
-fn gzip(data: &[u8]) -> Vec<u8> {
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
-    encoder.write_all(data).expect("writing to memory");
-    encoder.finish().expect("writing to memory")
-}
-
-fn zlib(data: &[u8]) -> Vec<u8> {
-    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    encoder.write_all(data).expect("writing to memory");
-    encoder.finish().expect("writing to memory")
-}
-
-fn bzip2(data: &[u8]) -> Vec<u8> {
-    let mut encoder = bzip2::write::BzEncoder::new(Vec::new(), bzip2::Compression::fast());
-    encoder.write_all(data).expect("writing to memory");
-    encoder.finish().expect("writing to memory")
-}
+#[path = "valid/compressed.rs"]
+mod compressed;
 
 /// 4 x 3 x 2 samples of a byte.
 fn samples() -> Vec<u8> {

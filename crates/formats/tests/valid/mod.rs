@@ -1,8 +1,11 @@
 //! Small valid files of every kind that is read, in several variants, and fragments of headers to insert.
 
+mod compressed;
+
+pub use compressed::gzip;
+use compressed::{bzip2, zlib};
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, WritableImage, f16};
-use flate2::{Compression, write::GzEncoder, write::ZlibEncoder};
-use std::io::{Cursor, Write};
+use std::io::Cursor;
 use tyndall::film::Tone;
 use tyndall::film::{StateLayer, StateValues};
 use tyndall_formats::image::{Metadata, Picture, write};
@@ -144,24 +147,6 @@ pub const PICTURE_WORDS: &[&str] = &[
     "string\0",
     "type\0",
 ];
-
-pub fn gzip(data: &[u8]) -> Vec<u8> {
-    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
-    encoder.write_all(data).expect("writing to memory");
-    encoder.finish().expect("writing to memory")
-}
-
-fn zlib(data: &[u8]) -> Vec<u8> {
-    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
-    encoder.write_all(data).expect("writing to memory");
-    encoder.finish().expect("writing to memory")
-}
-
-fn bzip2(data: &[u8]) -> Vec<u8> {
-    let mut encoder = bzip2::write::BzEncoder::new(Vec::new(), bzip2::Compression::fast());
-    encoder.write_all(data).expect("writing to memory");
-    encoder.finish().expect("writing to memory")
-}
 
 /// 4 x 3 x 2 samples of two bytes.
 fn samples() -> Vec<u8> {

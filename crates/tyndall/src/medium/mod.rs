@@ -265,7 +265,7 @@ impl Medium {
             Surface { albedo: optics.albedo, specular: optics.specular, roughness: optics.roughness };
         let mut event = Event { phase: self.phase, brdf: self.brdf, surface, normal: None, q: 0.0 };
         if optics.surface > 0.0 {
-            let Some(gradient) = self.volume.gradient_of_any_scale(p) else { return event };
+            let Some(gradient) = self.volume.gradient(p) else { return event };
             let range = Binade::of(self.gradient_range);
             let length = gradient.length * gradient.scale.over(range);
             let range = self.gradient_range * range.inverse();

@@ -37,9 +37,8 @@ pub struct Grid {
     space: Space,
     index_to_world: Affine3A,
     world_to_index: Affine3A,
-    gradient_to_world: Mat3,
     voxel_size: f32,
-    /// [`Self::gradient_to_world`] and the voxel size in a unit of length, a power of two, in which a voxel measures about 1.
+    /// For gradients, and the voxel size, both in a unit of length, a power of two, in which a voxel measures 1 to 2.
     gradient_per_scaled_voxel: Mat3,
     scaled_voxel_size: f32,
 }
@@ -111,7 +110,6 @@ impl Grid {
         let center = (DVec3::from_array(origin) + linear * middle).to_array();
         let voxel_size = cast::single(linear.determinant().abs().cbrt());
         let scale = Binade::of(voxel_size);
-        let gradient_to_world = inverse.transpose().as_mat3();
         let single = |m: DMat3, t: DVec3| Affine3A::from_mat3_translation(m.as_mat3(), t.as_vec3());
         Ok(Self {
             dims,
@@ -122,9 +120,8 @@ impl Grid {
             space,
             index_to_world: single(linear, -(linear * middle)),
             world_to_index: single(inverse, middle),
-            gradient_to_world,
             voxel_size,
-            gradient_per_scaled_voxel: gradient_to_world * scale.size(),
+            gradient_per_scaled_voxel: inverse.transpose().as_mat3() * scale.size(),
             scaled_voxel_size: voxel_size * scale.inverse(),
         })
     }
@@ -261,17 +258,10 @@ impl Grid {
         self.scaled_voxel_size
     }
 
-    /// A gradient per index unit turned into one per unit of [`Self::scaled_voxel_size`], along the world's axes.
+    /// A gradient per index unit turned into one along the world's axes (inverse transpose), per unit of [`Self::scaled_voxel_size`].
     #[inline]
     pub(crate) fn gradient_per_scaled_voxel(&self, g: Vec3) -> Vec3 {
         self.gradient_per_scaled_voxel * g
-    }
-
-    /// A gradient per index unit turned into one per world unit (inverse transpose).
-    #[inline]
-    #[must_use]
-    pub fn gradient_to_world(&self, g: Vec3) -> Vec3 {
-        self.gradient_to_world * g
     }
 }
 
@@ -293,7 +283,7 @@ mod tests {
         assert!((grid.world_to_index(world) - p).length() < 1e-4);
         assert!((grid.voxel_size() - 3.0_f32.cbrt()).abs() < 1e-6);
         // A field v = i (index x) grows by 1 per 0.5 world units along the first axis.
-        let g = grid.gradient_to_world(Vec3::X);
+        let g = grid.gradient_per_scaled_voxel(Vec3::X) * grid.scaled_voxel_size() / grid.voxel_size();
         assert!((g.length() - 2.0).abs() < 1e-5 && (f64::from(g.x) - 2.0 * c).abs() < 1e-5, "{g}");
     }
 
