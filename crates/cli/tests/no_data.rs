@@ -44,6 +44,7 @@ fn background_everywhere_is_nothing_and_anything_else_a_solid() {
             };
             assert!(status == Some(0) && (stderr.contains(&note) || value == -1e20), "{value}: {stderr}");
             assert_eq!(stderr.contains("invisible") || value.is_nan(), !seen, "{value}: {stderr}");
+            assert_eq!(stderr.contains("one solid block"), seen, "{value}: {stderr}");
             for preset in ["mri", "mri-glass", "solid", "cloud", "layers"] {
                 let patch = json!({ "transfer_function": { "preset": preset }, "film": { "size": [8, 8] } });
                 let image = picture(&folder, "a.nrrd", &patch, ways()[2]);

@@ -197,9 +197,12 @@ fn of_values(volume: &Volume) -> Vec<String> {
         notes.push(format!("the data are from {lo} to {hi}: {what}"));
     }
     if let Some(value) = volume.only_value() {
-        notes.push(format!(
-            "every sample is {value}: presets show nothing where that is background, and else one solid block"
-        ));
+        let shown = if Volume::is_background(value) {
+            "which presets take as background and show as nothing"
+        } else {
+            "which presets show as one solid block"
+        };
+        notes.push(format!("every sample is {value}, {shown}"));
     }
     notes
 }

@@ -31,6 +31,13 @@ impl Volume {
         (least == most && !self.is_empty()).then_some(least)
     }
 
+    /// Whether data of this value alone are background: 0, or the air of CT and what pads it.
+    #[must_use]
+    pub fn is_background(value: f64) -> bool {
+        const AIR: f64 = -1000.0;
+        value == 0.0 || value <= AIR
+    }
+
     /// Whether data may have values that single precision, in which they are read, does not tell apart: whole numbers beyond 2^24, or
     /// numbers in double precision that are close together for their size.
     #[must_use]

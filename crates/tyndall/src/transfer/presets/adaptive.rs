@@ -3,6 +3,7 @@
 use super::{Profile, labels, matter};
 use crate::math::cast;
 use crate::transfer::Point;
+use crate::volume::Volume;
 
 const TISSUE: [f32; 3] = [0.90, 0.70, 0.60];
 const BRIGHT: [f32; 3] = [0.95, 0.88, 0.80];
@@ -51,12 +52,9 @@ pub(super) fn is_two_phase(profile: &Profile) -> bool {
 /// What a preset shows of data of a single value, which has no threshold: nothing of background, and of anything else its densest
 /// matter, among the points that it would have.
 pub(super) fn of_one_value(points: &[Point], value: f64) -> Point {
-    /// In CT air is -1000, and padding below.
-    const AIR: f64 = -1000.0;
-
     let densest = points.iter().max_by(|a, b| a.optics.opacity.total_cmp(&b.optics.opacity));
     let mut optics = densest.map(|point| point.optics).unwrap_or_default();
-    if value == 0.0 || value <= AIR {
+    if Volume::is_background(value) {
         optics.opacity = 0.0;
     }
     Point { value: cast::single(value), optics }
