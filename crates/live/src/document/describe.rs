@@ -44,8 +44,10 @@ fn describe_list(node: Node) -> String {
     let items = items.unwrap_or_default();
     match length(node) {
         (shortest, Some(longest)) if shortest == longest => format!("a list of {longest} {items}"),
-        (0, _) => format!("a list of {items}"),
-        (shortest, _) => format!("a list of at least {shortest} {items}"),
+        (0, None) => format!("a list of {items}"),
+        (0, Some(longest)) => format!("a list of at most {longest} {items}"),
+        (shortest, Some(longest)) => format!("a list of {shortest} to {longest} {items}"),
+        (shortest, None) => format!("a list of at least {shortest} {items}"),
     }
 }
 
@@ -104,7 +106,7 @@ mod tests {
             ("transfer_function.points.[].albedo", "a number from 0 to 1 or a list of 3 numbers from 0 to 1"),
             ("medium.density", "a number of at least 0"),
             ("medium.phase", "a table with a `type`"),
-            ("lights", "a list of tables"),
+            ("lights", "a list of at most 250000 tables"),
             ("camera.position", "a list of 3 numbers from -1e+38 to 1e+38"),
             ("camera.up", "a list of 3 numbers"),
             ("camera.fov", "a number between 0 and 180, ends excluded"),

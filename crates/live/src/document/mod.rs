@@ -88,7 +88,7 @@ pub struct Document {
 
     /// Lights, any number of any type; when omitted, a soft sun and a sky. An empty list is darkness.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(length(max = 1_000_000))]
+    #[schemars(length(max = 250_000))]
     pub lights: Option<Vec<Light>>,
 
     /// The viewpoint of the picture; when omitted, an automatic view that fits the volume.

@@ -85,11 +85,11 @@ fn a_pixel_is_covered_as_far_as_matter_fills_it() {
 /// A march that samples each step at a random place must not leave the part of its ray that is kept.
 #[test]
 fn what_is_cut_away_is_in_no_sample() {
-    // Matter fills z < 0, and all that is below z = 0.0125, a twentieth of a voxel, is cut away.
+    // Matter fills z < 0, and all that is below z = 0.001 is cut away: an eighth of a step of `photon`, a 250th of a voxel.
     let nothing = Optics { opacity: 0.0, ..Optics::default() };
     let points = vec![Point { value: 0.0, optics: nothing }, Point { value: 1.0, optics: Optics::default() }];
     let half = blocks([8; 3], [2.0; 3], |p| f32::from(u8::from(p[2] < 4)));
-    let clip = vec![ClipShape::Plane { point: Vec3::Z * 0.0125, normal: -Vec3::Z }];
+    let clip = vec![ClipShape::Plane { point: Vec3::Z * 0.001, normal: -Vec3::Z }];
     let scene = Setup { clip, max_scatter: 0, ..Setup::new(half, points, 1e4) }.scene();
     for method in METHODS {
         let mut scene = scene.clone();
