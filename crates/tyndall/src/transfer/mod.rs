@@ -7,11 +7,13 @@
 mod difference;
 mod glow;
 mod historygram;
+mod integral;
 mod optics;
 mod presets;
 mod table;
 
 pub use difference::{BinSet, TransferDifference};
+pub(crate) use integral::OpacityIntegral;
 pub use historygram::{Grouping, HistoryGroups, Historygram};
 pub use optics::Optics;
 pub use presets::{PRESETS, Preset, PresetError};
@@ -178,6 +180,11 @@ impl TransferFunction {
     #[inline(always)]
     pub(crate) fn opacity_lanes<S: Lanes>(&self, simd: S, values: S::f32s) -> S::f32s {
         self.opacities.opacities(simd, values, |value| self.exact_opacity(value))
+    }
+
+    /// The integral of the opacity over a range of data values.
+    pub(crate) fn opacity_integral(&self, values: [f32; 2]) -> OpacityIntegral {
+        OpacityIntegral::new(&self.points, values, |value| self.opacity(value))
     }
 
     /// Smallest and largest opacity over data values `[lo, hi]`.
