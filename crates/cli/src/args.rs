@@ -252,6 +252,27 @@ pub struct BenchOptions {
     /// Smaller sizes, once each: shows that it works, measures nothing
     #[arg(long)]
     pub quick: bool,
+
+    /// Measure only this table of the set; repeatable
+    ///
+    /// Their names: core: sampling, flight, paths, threads, latency, costs, growth; looks: edits, look; historygrams: cornell-box,
+    /// ct, hard, figure-7, figure-8, figure-9, defaults, scans, gathering, path.
+    #[arg(long = "table", value_name = "NAME")]
+    pub tables: Vec<String>,
+
+    /// Folder with scans for the table `scans`: ct_chest_aorta_i16.nrrd, ct_head_promed_i16.nrrd, or one of them
+    ///
+    /// The MRI of examples/data is always measured.
+    #[arg(long, value_name = "DIR")]
+    pub data: Option<PathBuf>,
+
+    /// Show progress even when standard error is not a terminal
+    #[arg(long, conflicts_with = "quiet")]
+    pub progress: bool,
+
+    /// No progress
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// Sets of tables.

@@ -13,8 +13,8 @@ pub enum Display {
     Bar(ProgressBar),
     /// A line every few seconds.
     Lines {
-        /// When the last one was printed.
-        last: Instant,
+        /// When the last one was printed; the first is printed at once.
+        last: Option<Instant>,
     },
 }
 
@@ -33,14 +33,18 @@ impl Display {
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             return Self::Bar(bar);
         }
-        if forced { Self::Lines { last: Instant::now() } } else { Self::None }
+        if forced { Self::Lines { last: None } } else { Self::None }
     }
 
     /// Shows the share done (0 to 1), the seconds left and the error so far.
     pub fn show(&mut self, share: f64, samples: f64, left: Option<f64>, error: Option<f64>) {
         let left = left.map_or_else(String::new, |s| format!(", {s:.0} s left"));
         let error = error.map_or_else(String::new, |e| format!(", error {e:.4}"));
-        let text = format!("{samples:.1} samples{left}{error}");
+        self.say(share, format!("{samples:.1} samples{left}{error}"));
+    }
+
+    /// Shows the share done (0 to 1), and what is said of it.
+    pub fn say(&mut self, share: f64, text: String) {
         match self {
             Self::None => {}
             Self::Bar(bar) => {
@@ -48,12 +52,20 @@ impl Display {
                 bar.set_message(text);
             }
             Self::Lines { last } => {
-                if last.elapsed() >= LINES_EVERY {
-                    *last = Instant::now();
+                if last.is_none_or(|last| last.elapsed() >= LINES_EVERY) {
+                    *last = Some(Instant::now());
                     // Progress is optional: if stderr is closed it is dropped.
                     drop(writeln!(std::io::stderr(), "{:3.0} %  {text}", 100.0 * share));
                 }
             }
+        }
+    }
+
+    /// Prints with the bar out of the way.
+    pub fn aside<T>(&self, print: impl FnOnce() -> T) -> T {
+        match self {
+            Self::Bar(bar) => bar.suspend(print),
+            Self::None | Self::Lines { .. } => print(),
         }
     }
 

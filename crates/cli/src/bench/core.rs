@@ -218,6 +218,7 @@ pub fn latency(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     let (samples, slices) = effort.pick((3, 200), (100_000, 2));
     let mut rows = Vec::new();
     for integrator in METHODS.iter().map(|method| method.name) {
+        effort.show(integrator);
         let mut random = Stream::new(1, [0; 3]);
         let side = effort.pick(512, 32);
         let mut document = json!({ "film": { "size": [side, side] }, "render": { "integrator": integrator, "max_scatter": 8 } });

@@ -6,6 +6,7 @@ use crate::Failure;
 use serde_json::{Value, json};
 use std::time::Instant;
 use tyndall::integrator::KeptCount;
+use tyndall::scene::Scene;
 use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
 use tyndall_live::document;
@@ -67,6 +68,14 @@ pub struct Seconds {
     pub total: f64,
 }
 
+impl Seconds {
+    /// Of the last picture of a session, begun at `start`.
+    fn of(session: &Session, start: Instant) -> Self {
+        let total = start.elapsed().as_secs_f64();
+        Self { stages: PerStage::by_name(|stage| seconds(session, stage)), total }
+    }
+}
+
 /// What an edit cost; times are medians.
 pub struct Cost {
     /// A render of the edited scene from nothing.
@@ -83,29 +92,60 @@ pub struct Cost {
     pub kept: Vec<KeptCount>,
 }
 
+/// A live session that shows the scene before the edits.
+pub struct Live {
+    before: Scene,
+    session: Session,
+    /// How long its first picture took.
+    pub first: Seconds,
+}
+
+impl Live {
+    /// Renders a patched document from nothing.
+    pub fn start(bench: &Bench, patch: &Value, level: Level) -> Result<Self, Failure> {
+        let start = Instant::now();
+        let before = bench.scene(patch)?;
+        let session = bench.render(&before, level, 1);
+        let first = Seconds::of(&session, start);
+        Ok(Self { before, session, first })
+    }
+
+    /// Goes back to the scene before the edits.
+    pub fn restore(&mut self) {
+        self.session.set_scene(self.before.clone());
+        self.session.refine(&Budget::samples(1));
+    }
+}
+
 impl Edit<'_> {
     /// Plays the edit against a live session, again and again, by turns with renders from nothing.
     ///
     /// # Errors
     /// Where the live picture is not the one from nothing.
     pub fn measure(&self, effort: &Effort, level: Level) -> Result<Cost, Failure> {
+        self.measure_in(&mut Live::start(self.bench, &self.before, level)?, effort, level)
+    }
+
+    /// The same in a live session that shows the scene before the edit.
+    ///
+    /// # Errors
+    /// As [`Self::measure`].
+    pub fn measure_in(&self, live: &mut Live, effort: &Effort, level: Level) -> Result<Cost, Failure> {
         /// Edits after which the median hardly moves.
         const EDITS: usize = 3;
         let bench = self.bench;
         let after = document::apply(&self.before, &self.patch);
         let one = document::apply(&after, &json!({ "render": { "photon": { "segments": 1 } } }));
         let (mut scratch, mut edit, mut plain) = (Times::default(), Times::default(), Times::default());
-        let start = Instant::now();
-        let before = bench.scene(&self.before)?;
-        let mut live = bench.render(&before, level, 1);
+        let Live { before, session: live, first } = live;
         if self.against == Against::First {
-            scratch.add(&live, start);
+            scratch.0.push(*first);
         }
-        let (mut picture, mut all, mut kept) = (Vec::new(), computed(&live), live.report().kept);
-        let (mut all_gathers, mut gathers) = (gathers_of(&live), 0.0);
+        let (mut picture, mut all, mut kept) = (Vec::new(), computed(live), live.report().kept);
+        let (mut all_gathers, mut gathers) = (gathers_of(live), 0.0);
         let mut shares = PerStage::default();
         let begun = Instant::now();
-        let patient = |times: f64| begun.elapsed().as_secs_f64() < times * self.patience;
+        let patient = |times: f64| begun.elapsed().as_secs_f64() < times * self.patience && effort.has_time();
         for round in 0..effort.rounds.min(EDITS) {
             if round > 0 {
                 live.set_scene(before.clone());
@@ -125,16 +165,16 @@ impl Edit<'_> {
             let start = Instant::now();
             live.set_scene(bench.scene(&after)?);
             live.refine(&Budget::samples(1));
-            edit.add(&live, start);
-            let done = computed(&live);
+            edit.add(live, start);
+            let done = computed(live);
             let share = |done: f64, all: f64| if all > 0.0 { done / all } else { 0.0 };
             shares = PerStage {
                 photons: share(done.photons, all.photons),
                 segments: share(done.segments, all.segments),
             };
-            gathers = gathers_of(&live) as f64 / all_gathers.max(1) as f64;
+            gathers = gathers_of(live) as f64 / all_gathers.max(1) as f64;
             if self.against == Against::Equal {
-                check(&bits(&live), &picture)?;
+                check(&bits(live), &picture)?;
             }
             if !patient(4.0) {
                 break;
@@ -178,8 +218,7 @@ struct Times(Vec<Seconds>);
 
 impl Times {
     fn add(&mut self, session: &Session, start: Instant) {
-        let total = start.elapsed().as_secs_f64();
-        self.0.push(Seconds { stages: PerStage::by_name(|stage| seconds(session, stage)), total });
+        self.0.push(Seconds::of(session, start));
     }
 
     fn medians(self) -> Seconds {

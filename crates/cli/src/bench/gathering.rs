@@ -31,6 +31,7 @@ fn scene(name: &str, bench: &Bench, effort: &Effort, level: Level) -> Result<Vec
     let small = json!({ "film": { "size": [side, side] }, "render": { "max_scatter": 1 } });
     let with = |render: Value| bench.scene(&document::apply(&small, &json!({ "render": render })));
     let paths = with(json!({ "integrator": "path" }))?;
+    effort.show(&format!("{name}, what is true"));
     let truth = picture(&bench.render(&paths, level, effort.pick(256, 16)));
     let photons = effort.pick(1 << 20, 1 << 14);
     let least = Level::available().first().copied().unwrap_or(level);
@@ -48,8 +49,12 @@ fn scene(name: &str, bench: &Bench, effort: &Effort, level: Level) -> Result<Vec
     let scenes = ways.iter().map(scene_of).collect::<Result<Vec<_>, _>>()?;
     let mut times = ways.map(|_| Vec::new());
     let mut errors = ways.map(|_| 0.0);
-    for _ in 0..effort.rounds {
+    for round in 0..effort.rounds {
+        if round > 0 && !effort.has_time() {
+            break;
+        }
         for (i, scene) in scenes.iter().enumerate() {
+            effort.show(&format!("{name}, round {}", round + 1));
             let session = bench.render(scene, ways[i].1, 1);
             times[i].push(edit::seconds(&session, "segments"));
             errors[i] = error(&picture(&session), &truth);

@@ -58,6 +58,7 @@ fn by_photons(
     for scatterings in [1, 2] {
         for (i, &millions) in effort.pick(&[0.5, 1.0, 2.1, 4.2][..], &[2.1]).iter().enumerate() {
             let name = format!("{scatterings} scattering(s), {millions} M photons");
+            effort.show(&name);
             let before = settings(effort, millions * 1e6, scatterings, 7, case.steps_per_voxel);
             let cost = case.cost(before, against(i), effort, level).map_err(|e| e.within(&name))?;
             rows.push(
@@ -92,6 +93,7 @@ pub fn figure_9(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     for (scene, case) in [("Cornell box", Case::cornell_box(effort)?), ("CT-like", Case::ct(effort)?)] {
         for (i, &segments) in effort.pick(&[1, 2, 4, 7, 10, 15, 20][..], &[1, 7]).iter().enumerate() {
             let name = format!("{scene}, {segments} segment(s)");
+            effort.show(&name);
             let before = settings(effort, 2.1e6, 1, segments, case.steps_per_voxel);
             let cost = case.cost(before, against(i), effort, level).map_err(|e| e.within(&name))?;
             rows.push(Row::new(TABLE, name.clone(), "edit: photons", "s", cost.edit.stages.photons));

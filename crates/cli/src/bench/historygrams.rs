@@ -154,6 +154,7 @@ pub fn cornell_box(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
         let exact = against == Against::Equal;
         let measured = Edit { against, plain: exact, ..edit(&bench, before, recoloured()) };
         let name = format!("sphere recoloured, spatial = {spatial}");
+        effort.show(&name);
         let cost = measured.measure(effort, level).map_err(|e| e.within(&name))?;
         rows.extend(row(TABLE, &name, &cost, Some(&CORNELL), exact.then_some(15.0)));
     }
@@ -176,6 +177,7 @@ pub fn ct(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     ];
     let mut rows = Vec::new();
     for (name, before, patch, paper) in cases {
+        effort.show(name);
         let measured = Edit { plain: true, ..edit(&bench, before, patch) };
         let cost = measured.measure(effort, level).map_err(|e| e.within(name))?;
         rows.extend(row(TABLE, name, &cost, Some(&paper), None));
@@ -208,6 +210,7 @@ pub fn hard(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     ];
     let mut rows = Vec::new();
     for (name, before, patch, paper, wanted) in cases {
+        effort.show(name);
         let cost = edit(&bench, before, patch).measure(effort, level).map_err(|e| e.within(name))?;
         rows.extend(row(TABLE, name, &cost, paper.as_ref(), wanted));
     }

@@ -37,6 +37,7 @@ pub fn edits(effort: &Effort, level: Level, files: &[PathBuf]) -> Result<Vec<Row
     let mut rows = Vec::new();
     for (name, input) in inputs {
         for method in METHODS {
+            effort.show(&format!("{name}, {}", method.name));
             let side = effort.pick(800, 32);
             let mut input = input.clone();
             let patch = json!({ "film": { "size": [side, side] }, "render": { "integrator": method.name } });

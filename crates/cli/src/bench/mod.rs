@@ -9,13 +9,17 @@ mod historygrams;
 mod looks;
 mod photon_scenes;
 mod samples;
+mod scans;
 mod scene_edits;
 mod scenes;
 mod timing;
 
 use crate::args::{BenchName, BenchOptions};
+use crate::progress::Display;
 use crate::{Failure, say};
 use serde_json::{Value, json};
+use std::path::PathBuf;
+use tyndall::message::{excerpt, path_name};
 use tyndall::simd::Level;
 
 /// One figure.
@@ -161,69 +165,138 @@ fn markdown(title: &str, rows: &[Row]) -> String {
     text
 }
 
-/// Measures the rows of one table with the given vector instructions.
-type Table = fn(&timing::Effort, Level) -> Result<Vec<Row>, Failure>;
+/// A table: its rows, and what it may take.
+pub struct Table {
+    /// By which `--table` selects it.
+    name: &'static str,
+    /// About what it takes on two idle cores. Once these are over no edit is repeated, so that a set ends in time.
+    seconds: f64,
+    measure: Measure,
+}
 
-/// The same, for tables that depend on the command line.
-type Measure<'a> = dyn Fn(&timing::Effort, Level) -> Result<Vec<Row>, Failure> + 'a;
+/// Measures the rows of a table.
+type Measure = fn(&Run) -> Result<Vec<Row>, Failure>;
+
+/// What tables are measured with.
+pub struct Run<'a> {
+    effort: timing::Effort,
+    /// The vector instructions.
+    level: Level,
+    /// Scenes or volumes of the command line.
+    files: &'a [PathBuf],
+    scans: Vec<scans::Scan>,
+}
+
+const fn table(name: &'static str, seconds: f64, measure: Measure) -> Table {
+    Table { name, seconds, measure }
+}
 
 const CORE: &[Table] = &[
-    core::sampling,
-    core::flight,
-    core::paths,
-    core::threads,
-    core::latency,
-    scene_edits::costs,
-    growth::curves,
+    table("sampling", 5.0, |run| core::sampling(&run.effort, run.level)),
+    table("flight", 5.0, |run| core::flight(&run.effort, run.level)),
+    table("paths", 5.0, |run| core::paths(&run.effort, run.level)),
+    table("threads", 10.0, |run| core::threads(&run.effort, run.level)),
+    table("latency", 35.0, |run| core::latency(&run.effort, run.level)),
+    table("costs", 10.0, |run| scene_edits::costs(&run.effort, run.level)),
+    table("growth", 30.0, |run| growth::curves(&run.effort, run.level)),
+];
+
+const LOOKS: &[Table] = &[
+    table("edits", 60.0, |run| looks::edits(&run.effort, run.level, run.files)),
+    table("look", 10.0, |run| looks::look(&run.effort, run.level)),
 ];
 
 const HISTORYGRAMS: &[Table] = &[
-    historygrams::cornell_box,
-    historygrams::ct,
-    historygrams::hard,
-    historygram_figures::figure_7,
-    historygram_figures::figure_8,
-    historygram_figures::figure_9,
-    historygram_figures::defaults,
-    gathering::estimates,
-    samples::edits,
+    table("cornell-box", 40.0, |run| historygrams::cornell_box(&run.effort, run.level)),
+    table("ct", 30.0, |run| historygrams::ct(&run.effort, run.level)),
+    table("hard", 30.0, |run| historygrams::hard(&run.effort, run.level)),
+    table("figure-7", 60.0, |run| historygram_figures::figure_7(&run.effort, run.level)),
+    table("figure-8", 30.0, |run| historygram_figures::figure_8(&run.effort, run.level)),
+    table("figure-9", 60.0, |run| historygram_figures::figure_9(&run.effort, run.level)),
+    table("defaults", 10.0, |run| historygram_figures::defaults(&run.effort, run.level)),
+    table("scans", 120.0, |run| scans::edits(&run.effort, run.level, &run.scans)),
+    table("gathering", 60.0, |run| gathering::estimates(&run.effort, run.level)),
+    table("path", 60.0, |run| samples::edits(&run.effort, run.level)),
 ];
 
 /// Measures the tables and prints each as soon as it is complete, or all at the end as JSON.
 pub fn run(options: &BenchOptions) -> Result<(), Failure> {
-    if let (BenchName::Core | BenchName::Historygrams, Some(file)) = (options.name, options.files.first()) {
-        let file = tyndall::message::path_name(file);
-        return Err(Failure::usage(format!(
-            "{file}: only `looks` measures files; name it, or leave the file out"
-        )));
-    }
-    let level = crate::machine::vector_instructions()?;
-    let effort = timing::Effort::new(options.quick);
-    let mut all = Vec::new();
-    let edits = |effort: &timing::Effort, level| looks::edits(effort, level, &options.files);
-    let looks: [&Measure; 2] = [&edits, &looks::look];
-    let fixed = |tables: &'static [Table]| tables.iter().map(|table| table as _);
-    let tables: Vec<_> = match options.name {
-        BenchName::Core => fixed(CORE).collect(),
-        BenchName::Historygrams => fixed(HISTORYGRAMS).collect(),
-        BenchName::Looks => looks.to_vec(),
-        BenchName::All => fixed(CORE).chain(looks).chain(fixed(HISTORYGRAMS)).collect(),
+    let tables = chosen(options)?;
+    let scans = match tables.iter().any(|table| table.name == SCANS) {
+        true => scans::find(options.data.as_deref())?,
+        false => Vec::new(),
     };
+    let display = Display::new(options.progress, options.quiet);
+    let effort = timing::Effort::new(options.quick, &tables, display);
+    let level = crate::machine::vector_instructions()?;
+    let run = Run { effort, level, files: &options.files, scans };
+    let measured = measure(&tables, &run, options);
+    run.effort.finish();
+    measured
+}
+
+fn measure(tables: &[&Table], run: &Run, options: &BenchOptions) -> Result<(), Failure> {
+    let mut all = Vec::new();
     for table in tables {
-        let rows = table(&effort, level)?;
+        run.effort.begin(table);
+        let rows = (table.measure)(run)?;
         let title = rows.first().map_or("", |row| row.table);
         if options.markdown {
-            say(&markdown(title, &rows))?;
+            run.effort.aside(|| say(&markdown(title, &rows)))?;
         } else if !options.json {
-            say(&format!("\n{title}\n{}", rows.iter().map(Row::line).collect::<String>()))?;
+            let lines = rows.iter().map(Row::line).collect::<String>();
+            run.effort.aside(|| say(&format!("\n{title}\n{lines}")))?;
         }
         all.extend(rows);
     }
     if options.json {
         let rows: Vec<Value> = all.iter().map(|row| row.json(options.quick)).collect();
-        say(&format!("{:#}\n", Value::Array(rows)))?;
+        run.effort.aside(|| say(&format!("{:#}\n", Value::Array(rows))))?;
     }
     Ok(())
+}
+
+/// The table that measures scans.
+const SCANS: &str = "scans";
+
+/// The table that measures the files of the command line.
+const EDITS: &str = "edits";
+
+/// The tables of the command line, in the order in which they are listed above.
+fn chosen(options: &BenchOptions) -> Result<Vec<&'static Table>, Failure> {
+    let sets: &[&'static [Table]] = match options.name {
+        BenchName::Core => &[CORE],
+        BenchName::Historygrams => &[HISTORYGRAMS],
+        BenchName::Looks => &[LOOKS],
+        BenchName::All => &[CORE, LOOKS, HISTORYGRAMS],
+    };
+    let of_set = || sets.iter().copied().flatten();
+    let named = |name: &str| of_set().any(|table| table.name == name);
+    if let Some(unknown) = options.tables.iter().find(|name| !named(name)) {
+        let names: Vec<&str> = of_set().map(|table| table.name).collect();
+        return Err(Failure::usage(format!(
+            "--table {}: no such table here; expected one of {}",
+            excerpt(unknown),
+            names.join(", ")
+        )));
+    }
+    let is_chosen =
+        |table: &Table| options.tables.is_empty() || options.tables.iter().any(|name| name == table.name);
+    let tables: Vec<&Table> = of_set().filter(|table| is_chosen(table)).collect();
+    let measures = |name: &str| tables.iter().any(|table| table.name == name);
+    if let Some(file) = options.files.first().filter(|_| !measures(EDITS)) {
+        return Err(Failure::usage(format!(
+            "{}: only `looks` measures files; name it, or leave the file out",
+            path_name(file)
+        )));
+    }
+    if let Some(folder) = options.data.as_ref().filter(|_| !measures(SCANS)) {
+        return Err(Failure::usage(format!(
+            "--data {}: only the table `{SCANS}` of `historygrams` measures scans; name it, or leave the option out",
+            path_name(folder)
+        )));
+    }
+    Ok(tables)
 }
 
 #[cfg(test)]

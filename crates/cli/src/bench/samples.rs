@@ -56,6 +56,9 @@ fn cost(
     let mut share = 0.0;
     for round in 0..effort.rounds.min(3) {
         if round > 0 {
+            if !effort.has_time() {
+                break;
+            }
             live.set_scene(bench.scene(before)?);
             live.refine(&Budget::samples(SAMPLES));
         }
@@ -105,6 +108,7 @@ pub fn edits(effort: &Effort, level: Level) -> Result<Vec<Row>, Failure> {
     ];
     let mut rows = Vec::new();
     for (name, bench, patch, scatterings) in cases {
+        effort.show(name);
         let before = json!({ "render": { "integrator": "path", "max_scatter": scatterings } });
         let cost = cost(effort, level, bench, &before, &patch).map_err(|e| e.within(name))?;
         let Cost { without_histories: without, share, .. } = cost;
