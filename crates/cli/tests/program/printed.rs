@@ -1,8 +1,6 @@
 //! What is printed besides pictures: what the loader understood, notes, lists.
 
-mod support;
-
-use support::{Ended, Folder, json, run};
+use crate::support::{Ended, Folder, json, run};
 use tyndall_formats::image::{Metadata, read_metadata};
 
 /// A cloud in a few pixels.

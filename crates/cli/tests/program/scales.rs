@@ -1,11 +1,8 @@
 //! A body of any scale of values and of voxels gives the same picture.
 
-mod data;
-mod support;
-
-use data::{Data, Way, apart, mean, picture, ways};
+use crate::data::{Data, Way, apart, mean, picture, ways};
+use crate::support::Folder;
 use serde_json::{Value, json};
-use support::Folder;
 use tyndall::film::Image;
 use tyndall_live::document::apply;
 

@@ -1,11 +1,8 @@
 //! `tyndall replay`: edits against a live session, their reports, and invalid edits files.
 
-mod fault;
-mod support;
-
-use fault::{Fault, SCENE};
+use crate::fault::{Fault, SCENE};
+use crate::support::{Ended, Folder};
 use serde_json::{Value, json};
-use support::{Ended, Folder};
 
 const CLOUD: &str = "\
     volume.procedural = { kind = 'cloud', size = [12, 12, 12] }\n\

@@ -1,11 +1,8 @@
 //! Label maps without options: every part is seen, in a colour of its own that it has in every file.
 
-mod data;
-mod support;
-
-use data::{Data, mean, open, picture, ways};
+use crate::data::{Data, mean, open, picture, ways};
+use crate::support::{Folder, json as parse, run};
 use serde_json::{Value, json};
-use support::{Folder, json as parse, run};
 use tyndall::simd::Level;
 use tyndall::volume::Interpolation;
 use tyndall_formats::image::{Metadata, read_metadata};

@@ -1,10 +1,7 @@
 //! The look that is chosen for a volume without a scene.
 
-mod data;
-mod support;
-
-use data::Data;
-use support::{Folder, json, run};
+use crate::data::Data;
+use crate::support::{Folder, json, run};
 
 /// The preset that `info` tells, of samples stored as `short`.
 fn preset(data: &Data) -> String {

@@ -1,8 +1,6 @@
 //! Where the texels of an environment map are in the world, as docs/scene.md says.
 
-mod support;
-
-use support::{Folder, decode, run, written};
+use crate::support::{Folder, decode, run, written};
 use tyndall::film::Tone;
 use tyndall::integrator::METHODS;
 use tyndall_formats::image::{Metadata, Picture, write};

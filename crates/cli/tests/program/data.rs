@@ -1,5 +1,4 @@
 //! Volumes of a few values, and their pictures by every method on every level of vector instructions.
-#![allow(dead_code, reason = "each file of tests uses what it needs")]
 
 use crate::support::Folder;
 use serde_json::{Value, json};

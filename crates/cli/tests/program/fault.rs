@@ -1,5 +1,4 @@
 //! Runs that must fail: what the program must say and do, and what it must not.
-#![allow(dead_code, reason = "each file of tests uses what it needs")]
 
 use crate::support::{Ended, Folder};
 use std::time::Duration;

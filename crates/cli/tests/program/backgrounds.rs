@@ -1,8 +1,6 @@
 //! What is seen behind the matter in 8-bit pictures.
 
-mod support;
-
-use support::{Folder, decode, run, written};
+use crate::support::{Folder, decode, run, written};
 use tyndall::integrator::METHODS;
 
 /// A glowing ball in the middle of a picture whose corners it leaves free.

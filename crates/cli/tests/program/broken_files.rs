@@ -1,12 +1,9 @@
 //! Broken volumes and maps in every format give one message that names the file and the fault, promptly and without
 //! allocating the memory that the file claims to need.
 
-mod fault;
-mod support;
-
-use fault::{Fault, LONGEST, MOST_MEMORY, SCENE, file};
+use crate::fault::{Fault, LONGEST, MOST_MEMORY, SCENE, file};
+use crate::support::{Ended, Folder};
 use std::io::Write;
-use support::{Ended, Folder};
 
 /// An NRRD file of a few bytes.
 fn nrrd(fields: &str, samples: &[u8]) -> Vec<u8> {

@@ -1,11 +1,8 @@
 //! Images, volumes of one voxel along an axis, are seen from the front without options.
 
-mod data;
-mod support;
-
-use data::{Data, picture, ways};
+use crate::data::{Data, picture, ways};
+use crate::support::Folder;
 use serde_json::json;
-use support::Folder;
 
 /// Whichever axis is thin, nearly all of the picture is covered, by every method; edge-on it would be a line.
 #[test]

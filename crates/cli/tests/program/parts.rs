@@ -1,10 +1,8 @@
 //! Renders in several runs: parts that are merged, and renders that are resumed, both exactly as a single run.
 
-mod support;
-
+use crate::support::{Ended, Folder, run, written};
 use std::process::Stdio;
 use std::time::Duration;
-use support::{Ended, Folder, run, written};
 use tyndall::integrator::METHODS;
 use tyndall_formats::image::{Metadata, read_metadata};
 

@@ -1,11 +1,8 @@
 //! A volume far from its file's origin, as surveys have, gives the picture and the bounds of the same volume at the origin.
 
-mod data;
-mod support;
-
-use data::{Data, mean, picture, ways};
+use crate::data::{Data, mean, picture, ways};
+use crate::support::{Folder, json as parse, run};
 use serde_json::{Value, json};
-use support::{Folder, json as parse, run};
 
 /// Origins and spacings of surveys.
 const PLACES: [([f64; 3], f64); 4] = [

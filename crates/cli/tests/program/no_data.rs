@@ -1,11 +1,8 @@
 //! NaN is no data, and data of a single value are nothing or a solid.
 
-mod data;
-mod support;
-
-use data::{Data, apart, mean, picture, ways};
+use crate::data::{Data, apart, mean, picture, ways};
+use crate::support::{Ended, Folder, json as parse, run};
 use serde_json::{Value, json};
-use support::{Ended, Folder, json as parse, run};
 use tyndall::film::Image;
 
 fn even(value: f64) -> Data {

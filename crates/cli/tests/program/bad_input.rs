@@ -1,10 +1,7 @@
 //! Bad input ends with the right exit status and one message that names the fault: 1 where the input is at fault, 2
 //! where the command line is. Nothing panics, nothing hangs, nothing is left behind, and no run takes a gibibyte.
 
-mod fault;
-mod support;
-
-use fault::{Fault, SCENE, file, options, toml};
+use crate::fault::{Fault, SCENE, file, options, toml};
 
 #[test]
 fn a_key_at_fault_is_named_with_its_file() {

@@ -1,8 +1,6 @@
 //! Successful runs: what is written, that pictures can be rendered again, and what the options change.
 
-mod support;
-
-use support::{Ended, Folder, decode, files_in_out, json, run, written};
+use crate::support::{Ended, Folder, decode, files_in_out, json, run, written};
 use tyndall_formats::image::{Metadata, read_metadata};
 
 const KINDS: [&str; 4] = ["png", "jpg", "tif", "exr"];

@@ -1,11 +1,8 @@
 //! Values that single precision does not tell apart are refused by name, or noted; never is one taken for the other silently.
 
-mod data;
-mod support;
-
-use data::Data;
+use crate::data::Data;
+use crate::support::{Ended, Folder};
 use serde_json::{Value, json};
-use support::{Ended, Folder};
 
 const LOW: f64 = 16_777_216.0;
 

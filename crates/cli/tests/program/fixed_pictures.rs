@@ -1,11 +1,9 @@
 //! Pictures of the examples keep their bits: whoever changes them on purpose renders them again with `TYNDALL_FIX_PICTURES=1`, says so in
 //! CHANGELOG.md, and shows with tools/z_test.py that the light is the same.
 
-mod support;
-
+use crate::support::{Folder, decode, written};
 use std::fs;
 use std::path::{Path, PathBuf};
-use support::{Folder, decode, written};
 use tyndall::integrator::METHODS;
 
 /// Fraction of a picture's bytes that may differ: another mathematical library rounds otherwise now and then.

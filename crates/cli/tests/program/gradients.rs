@@ -1,11 +1,8 @@
 //! What gradients are measured against: what is nowhere in the picture does not change how surfaces look.
 
-mod data;
-mod support;
-
-use data::{Data, apart, mean, open, picture, ways};
+use crate::data::{Data, apart, mean, open, picture, ways};
+use crate::support::{Folder, json as parse, run, written};
 use serde_json::{Value, json};
-use support::{Folder, json as parse, run, written};
 use tyndall::simd::Level;
 use tyndall_formats::image::{Metadata, read_metadata};
 
@@ -109,7 +106,7 @@ fn scene_of(folder: &Folder, name: &str) -> Value {
 
 /// A PNG's pixels with another scene in the metadata.
 fn with_scene(png: &[u8], scene: &Value) -> Vec<u8> {
-    let (size, _, pixels) = support::decode(png);
+    let (size, _, pixels) = crate::support::decode(png);
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, size[0], size[1]);
     encoder.set_color(png::ColorType::Rgb);
