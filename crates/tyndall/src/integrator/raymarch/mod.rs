@@ -1,5 +1,5 @@
 //! Emission, absorption and single scattering by marching along the view ray, with shadow rays to
-//! every light: fast and deterministic, but flat.
+//! every light: deterministic, but flat.
 //!
 //! Light from glowing matter that other matter scatters is left out.
 
@@ -16,7 +16,7 @@ use march::Packet;
 
 impl Method for RayMarch {
     const NAME: &'static str = "raymarch";
-    const ABOUT: &'static str = "Ray marching with shadow rays: emission, absorption and single scattering; deterministic, fast and flat.";
+    const ABOUT: &'static str = "Ray marching with shadow rays: emission, absorption and single scattering; deterministic and flat.";
     const HAS_NOISE: bool = false;
     // They only smooth edges.
     const DEFAULT_SAMPLES: u32 = 4;
