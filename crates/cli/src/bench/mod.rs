@@ -146,9 +146,12 @@ fn markdown(title: &str, rows: &[Row]) -> String {
         rows.iter().filter(move |row| (row.quantity, row.unit) == column)
     };
     for &(quantity, unit) in &columns {
-        let mut targets: Vec<String> =
-            of((quantity, unit)).map(Row::target).filter(|t| !t.is_empty()).collect();
-        targets.dedup();
+        let mut targets: Vec<String> = Vec::new();
+        for target in of((quantity, unit)).map(Row::target) {
+            if !target.is_empty() && !targets.contains(&target) {
+                targets.push(target);
+            }
+        }
         let targets = if targets.is_empty() { String::new() } else { format!(" ({})", targets.join("; ")) };
         let unit = if unit == "ratio" { String::new() } else { format!(", {unit}") };
         text += &format!(" {quantity}{unit}{targets} |");
@@ -207,16 +210,16 @@ const LOOKS: &[Table] = &[
 ];
 
 const HISTORYGRAMS: &[Table] = &[
-    table("cornell-box", 40.0, |run| historygrams::cornell_box(&run.effort, run.level)),
+    table("cornell-box", 25.0, |run| historygrams::cornell_box(&run.effort, run.level)),
     table("ct", 30.0, |run| historygrams::ct(&run.effort, run.level)),
-    table("hard", 30.0, |run| historygrams::hard(&run.effort, run.level)),
-    table("figure-7", 60.0, |run| historygram_figures::figure_7(&run.effort, run.level)),
+    table("hard", 20.0, |run| historygrams::hard(&run.effort, run.level)),
+    table("figure-7", 30.0, |run| historygram_figures::figure_7(&run.effort, run.level)),
     table("figure-8", 30.0, |run| historygram_figures::figure_8(&run.effort, run.level)),
-    table("figure-9", 60.0, |run| historygram_figures::figure_9(&run.effort, run.level)),
+    table("figure-9", 40.0, |run| historygram_figures::figure_9(&run.effort, run.level)),
     table("defaults", 10.0, |run| historygram_figures::defaults(&run.effort, run.level)),
     table("scans", 120.0, |run| scans::edits(&run.effort, run.level, &run.scans)),
-    table("gathering", 60.0, |run| gathering::estimates(&run.effort, run.level)),
-    table("path", 60.0, |run| samples::edits(&run.effort, run.level)),
+    table("gathering", 20.0, |run| gathering::estimates(&run.effort, run.level)),
+    table("path", 10.0, |run| samples::edits(&run.effort, run.level)),
 ];
 
 /// Measures the tables and prints each as soon as it is complete, or all at the end as JSON.

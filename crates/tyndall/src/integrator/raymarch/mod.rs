@@ -16,7 +16,8 @@ use march::Packet;
 
 impl Method for RayMarch {
     const NAME: &'static str = "raymarch";
-    const ABOUT: &'static str = "Ray marching with shadow rays: emission, absorption and single scattering; deterministic and flat.";
+    const ABOUT: &'static str =
+        "Ray marching with shadow rays: emission, absorption and single scattering; deterministic and flat.";
     const HAS_NOISE: bool = false;
     // They only smooth edges.
     const DEFAULT_SAMPLES: u32 = 4;
