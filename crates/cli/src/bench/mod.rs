@@ -305,6 +305,20 @@ fn chosen(options: &BenchOptions) -> Result<Vec<&'static Table>, Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_help_names_every_table_in_order() {
+        let command = crate::args::Args::command();
+        let bench = command.find_subcommand("bench").expect("the command");
+        let table = bench.get_arguments().find(|argument| argument.get_id() == "tables").expect("the option");
+        let help = table.get_long_help().expect("a help").to_string();
+        for (set, tables) in [("core", CORE), ("looks", LOOKS), ("historygrams", HISTORYGRAMS)] {
+            let names: Vec<&str> = tables.iter().map(|table| table.name).collect();
+            let expected = format!("{set}: {}", names.join(", "));
+            assert!(help.contains(&expected), "{expected}, in: {help}");
+        }
+    }
 
     #[test]
     fn a_markdown_table_has_a_line_for_each_case_and_a_column_for_each_quantity() {
