@@ -33,7 +33,7 @@ fn a_picture_that_cannot_be_written_is_refused_before_the_work() {
         &["-o", "a.exr", "--resumable"],
     ] {
         let (mut refused, mut written) = (0, 0);
-        for limit in [250, 300, 350, 400, 500, 700, 1000] {
+        for limit in [250, 300, 350, 400, 500, 700, 1000, 2000, 4000] {
             let options = ["render", "../scene.toml", "--size", "1000x1000", "--threads", "1", "-q"];
             let (status, stderr) = run_within(&folder, limit, &[&options[..], outputs].concat());
             let files = files_in_out(&folder);
