@@ -211,7 +211,7 @@ fn chosen<M: Method>(choice: &MethodChoice) -> Option<&M::Settings> {
 }
 
 /// A scene's settings; the defaults if it selects another method.
-fn settings_of<M: Method>(scene: &Scene) -> M::Settings {
+pub(super) fn settings_of<M: Method>(scene: &Scene) -> M::Settings {
     chosen::<M>(&scene.render.method).cloned().unwrap_or_default()
 }
 

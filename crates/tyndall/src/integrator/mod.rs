@@ -10,6 +10,7 @@ mod history;
 mod light_paths;
 mod method;
 mod next_event;
+mod shadow_grid;
 mod stop;
 mod view_march;
 
@@ -22,6 +23,7 @@ mod plain;
 
 pub(crate) use disposal::drop_elsewhere;
 pub(crate) use engine::Engine;
+use engine::settings_of;
 pub use engine::MethodEntry;
 pub use method::{
     Edited, ItemChanges, KeptCount, KeptItems, MemoryNeed, Method, MethodReport, MovedKey, NamedCount,

@@ -1,6 +1,6 @@
 //! Rectangles, disks and spheres that emit light.
 
-use super::{Emitted, Enclosure, LightSample, Passed, Target, strength_of_area};
+use super::{Emitted, Enclosure, LightPoint, LightSample, Passed, Target, strength_of_area};
 use crate::math::{Frame, Ray, Rgb, Vec3, cast};
 use crate::sampling::warp;
 use std::f32::consts::PI;
@@ -67,6 +67,11 @@ impl Rect {
             + self.frame.v * ((u[1] - 0.5) * self.size[1])
     }
 
+    pub(super) fn light_point(&self, u: [f32; 2]) -> LightPoint {
+        let intensity = self.radiance * self.area();
+        LightPoint { position: self.point(u), normal: Some(self.frame.w), intensity }
+    }
+
     #[inline]
     pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
         flat_sample(from, self.point(u), self.frame.w, self.area(), self.radiance)
@@ -126,6 +131,11 @@ impl Disk {
         self.middle + self.frame.u * x + self.frame.v * y
     }
 
+    pub(super) fn light_point(&self, u: [f32; 2]) -> LightPoint {
+        let intensity = self.radiance * self.area();
+        LightPoint { position: self.point(u), normal: Some(self.frame.w), intensity }
+    }
+
     #[inline]
     pub(super) fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
         flat_sample(from, self.point(u), self.frame.w, self.area(), self.radiance)
@@ -168,6 +178,11 @@ pub struct SphereLight {
 }
 
 impl SphereLight {
+    /// Solid angle that it subtends; 0 from inside, where it sends no light.
+    pub(crate) fn solid_angle(&self, from: Vec3) -> f32 {
+        2.0 * PI * self.cap(from).unwrap_or(0.0)
+    }
+
     /// `1 - cos` of the half angle that the sphere subtends; `None` from inside.
     fn cap(&self, from: Vec3) -> Option<f32> {
         let sin_squared = self.radius * self.radius / (self.middle - from).length_squared();

@@ -49,6 +49,17 @@ pub struct LightSample {
     pub pdf: f32,
 }
 
+/// A point of a light: [`LightSample::radiance`] from it is `intensity max(0, cos) / distance^2`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPoint {
+    /// World position.
+    pub position: Vec3,
+    /// The axis from which the cosine is measured; `None` for a light that is equal in all directions.
+    pub normal: Option<Vec3>,
+    /// Radiant intensity along the normal, over the pdf by area, W/sr.
+    pub intensity: Rgb,
+}
+
 /// A light that a ray passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passed {
@@ -90,6 +101,24 @@ impl Light {
             Self::Sphere(l) => l.sample(from, u),
             Self::Environment(l) => l.sample(u),
         }
+    }
+
+    /// A fixed point of a light from whose points light comes whatever receives it: of a point light, a rectangle or a disk. `u` selects it
+    /// as in [`Self::sample`].
+    #[must_use]
+    pub fn point(&self, u: [f32; 2]) -> Option<LightPoint> {
+        match self {
+            Self::Point(l) => Some(LightPoint { position: l.position, normal: None, intensity: l.intensity }),
+            Self::Rect(l) => Some(l.light_point(u)),
+            Self::Disk(l) => Some(l.light_point(u)),
+            Self::Directional(_) | Self::Sphere(_) | Self::Environment(_) => None,
+        }
+    }
+
+    /// Whether it is infinitely far, so that [`Self::sample`] is the same from everywhere.
+    #[must_use]
+    pub fn is_distant(&self) -> bool {
+        matches!(self, Self::Directional(_) | Self::Environment(_))
     }
 
     /// Where a ray passes the light, if it passes its emitting side.

@@ -27,9 +27,9 @@ pub struct Clip {
 
 /// Keeps the points with `normal . p <= offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct HalfSpace {
-    normal: Vec3,
-    offset: f32,
+pub(crate) struct HalfSpace {
+    pub normal: Vec3,
+    pub offset: f32,
 }
 
 impl Clip {
@@ -56,6 +56,11 @@ impl Clip {
             }
         }
         Self { half_spaces }
+    }
+
+    /// What is kept is in all of these, in index space.
+    pub(crate) fn half_spaces(&self) -> &[HalfSpace] {
+        &self.half_spaces
     }
 
     /// Whether each lane's index-space position is kept.

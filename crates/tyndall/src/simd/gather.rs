@@ -16,6 +16,12 @@ pub(crate) trait Lanes:
     /// `SCALE` is 1, 2, 4 or 8, every index is below 2^31, and four bytes can be read at every address.
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s;
 
+    /// As many bytes as there are lanes, one in each.
+    ///
+    /// # Safety
+    /// So many bytes can be read at the address.
+    unsafe fn widen_bytes(self, bytes: *const u8) -> Self::u32s;
+
     /// Lanes of a vector.
     const WIDTH: usize = <Self::f32s as SimdBase<Self>>::LEN;
 
@@ -53,6 +59,16 @@ pub(crate) trait Lanes:
         }
     }
 
+    /// Consecutive bytes from the `first` on, one in each lane; 0 in all lanes if there are not so many.
+    #[inline(always)]
+    fn bytes(self, numbers: &[u8], first: usize) -> Self::u32s {
+        match numbers.get(first..first + Self::WIDTH) {
+            // SAFETY: the slice has as many bytes as there are lanes.
+            Some(bytes) => unsafe { self.widen_bytes(bytes.as_ptr()) },
+            None => Self::u32s::splat(self, 0),
+        }
+    }
+
     /// Clamps indices to the last valid one, which is below 2^31.
     #[inline(always)]
     fn at_most(self, index: Self::u32s, last: usize) -> Self::u32s {
@@ -61,6 +77,12 @@ pub(crate) trait Lanes:
 }
 
 impl Lanes for Fallback {
+    #[inline(always)]
+    unsafe fn widen_bytes(self, bytes: *const u8) -> Self::u32s {
+        // SAFETY: guaranteed by the caller.
+        unsafe { widen_one_by_one(self, bytes) }
+    }
+
     #[inline(always)]
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
         // SAFETY: guaranteed by the caller.
@@ -71,6 +93,12 @@ impl Lanes for Fallback {
 #[cfg(target_arch = "aarch64")]
 impl Lanes for fearless_simd::Neon {
     #[inline(always)]
+    unsafe fn widen_bytes(self, bytes: *const u8) -> Self::u32s {
+        // SAFETY: guaranteed by the caller.
+        unsafe { widen_one_by_one(self, bytes) }
+    }
+
+    #[inline(always)]
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
         // SAFETY: guaranteed by the caller.
         unsafe { one_by_one::<Self, SCALE>(self, base, index) }
@@ -79,6 +107,13 @@ impl Lanes for fearless_simd::Neon {
 
 #[cfg(target_arch = "x86_64")]
 impl Lanes for fearless_simd::Avx2 {
+    #[inline(always)]
+    unsafe fn widen_bytes(self, bytes: *const u8) -> Self::u32s {
+        use std::arch::x86_64::{_mm_loadl_epi64, _mm256_cvtepu8_epi32};
+        // SAFETY: the token proves that the instructions exist; the caller guarantees the eight bytes.
+        unsafe { _mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes.cast())) }.simd_into(self)
+    }
+
     #[inline(always)]
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
         // SAFETY: the token proves that the instructions exist; the caller guarantees the addresses.
@@ -90,11 +125,28 @@ impl Lanes for fearless_simd::Avx2 {
 #[cfg(target_arch = "x86_64")]
 impl Lanes for fearless_simd::Avx512 {
     #[inline(always)]
+    unsafe fn widen_bytes(self, bytes: *const u8) -> Self::u32s {
+        use std::arch::x86_64::{_mm_loadu_si128, _mm512_cvtepu8_epi32};
+        // SAFETY: the token proves that the instructions exist; the caller guarantees the sixteen bytes.
+        unsafe { _mm512_cvtepu8_epi32(_mm_loadu_si128(bytes.cast())) }.simd_into(self)
+    }
+
+    #[inline(always)]
     unsafe fn gather_words<const SCALE: i32>(self, base: *const u8, index: Self::u32s) -> Self::u32s {
         // SAFETY: the token proves that the instructions exist; the caller guarantees the addresses.
         let words = unsafe { std::arch::x86_64::_mm512_i32gather_epi32::<SCALE>(index.into(), base.cast()) };
         words.simd_into(self)
     }
+}
+
+/// Widening for processors without an instruction for it, or whose compiler finds it.
+///
+/// # Safety
+/// As [`Lanes::widen_bytes`].
+#[inline(always)]
+unsafe fn widen_one_by_one<S: Lanes>(simd: S, bytes: *const u8) -> S::u32s {
+    // SAFETY: the caller guarantees as many bytes as there are lanes.
+    S::u32s::from_fn(simd, |lane| u32::from(unsafe { bytes.add(lane).read() }))
 }
 
 /// The gather for processors without a gather instruction.
@@ -132,6 +184,10 @@ mod tests {
             let bytes = simd.words(self.bytes, index);
             let shorts = simd.words(self.shorts, index);
             let numbers = simd.numbers(self.numbers, index);
+            let run = simd.bytes(self.bytes, 3);
+            assert!((0..S::WIDTH).all(|lane| run.as_slice()[lane] == u32::from(self.bytes[3 + lane])));
+            let past = simd.bytes(self.bytes, self.bytes.len() - S::WIDTH + 1);
+            assert!(past.as_slice().iter().all(|&byte| byte == 0));
             (0..S::WIDTH)
                 .map(|i| (bytes.as_slice()[i], shorts.as_slice()[i], numbers.as_slice()[i]))
                 .collect()

@@ -1,6 +1,7 @@
 //! Where the voxels are: dimensions and the map between index space and the world.
 
 use crate::math::{Affine3A, Binade, Bounds, DMat3, DVec3, Mat3, Ray, Vec3, cast};
+use crate::simd::Lanes;
 
 /// Which way is up, and what the axes mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -252,6 +253,13 @@ impl Grid {
         )
     }
 
+    /// A world direction in index space, scaled so that distances along it are those of the world.
+    #[inline]
+    #[must_use]
+    pub fn direction_to_index(&self, direction: Vec3) -> Vec3 {
+        self.world_to_index.transform_vector3(direction)
+    }
+
     /// The voxel size divided by the power of two below it: 1 to 2.
     #[inline]
     pub(crate) fn scaled_voxel_size(&self) -> f32 {
@@ -262,6 +270,13 @@ impl Grid {
     #[inline]
     pub(crate) fn gradient_per_scaled_voxel(&self, g: Vec3) -> Vec3 {
         self.gradient_per_scaled_voxel * g
+    }
+
+    /// [`Self::gradient_per_scaled_voxel`] of a gradient per lane.
+    #[inline(always)]
+    pub(super) fn gradient_per_scaled_voxel_lanes<S: Lanes>(&self, [x, y, z]: [S::f32s; 3]) -> [S::f32s; 3] {
+        let Mat3 { x_axis: a, y_axis: b, z_axis: c } = self.gradient_per_scaled_voxel;
+        [x * a.x + y * b.x + z * c.x, x * a.y + y * b.y + z * c.y, x * a.z + y * b.z + z * c.z]
     }
 }
 

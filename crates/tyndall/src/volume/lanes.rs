@@ -2,7 +2,7 @@
 
 use super::bricks::{BRICK, Lattice};
 use super::{Interpolation, Volume, Voxel, Voxels};
-use crate::math::Vec3;
+use crate::math::{Binade, Vec3};
 use crate::simd::Lanes;
 use fearless_simd::prelude::*;
 
@@ -27,6 +27,29 @@ impl Volume {
             Voxels::F64(samples) => self.stored_lanes(simd, samples, position),
         };
         stored * self.slope + self.intercept
+    }
+
+    /// [`Volume::gradient`] at a position per lane, along the world's axes, in values of `scale` per unit of length in which a voxel measures
+    /// [`Grid::scaled_voxel_size`](super::Grid::scaled_voxel_size). Gradients far below the scale become 0.
+    #[inline(always)]
+    pub(crate) fn gradient_lanes<S: Lanes>(
+        &self,
+        simd: S,
+        [x, y, z]: [S::f32s; 3],
+        scale: Binade,
+    ) -> [S::f32s; 3] {
+        let inverse = scale.inverse();
+        let ends = [
+            [self.value_lanes(simd, [x + 0.5, y, z]), self.value_lanes(simd, [x - 0.5, y, z])],
+            [self.value_lanes(simd, [x, y + 0.5, z]), self.value_lanes(simd, [x, y - 0.5, z])],
+            [self.value_lanes(simd, [x, y, z + 0.5]), self.value_lanes(simd, [x, y, z - 0.5])],
+        ];
+        let [gx, gy, gz] = ends;
+        self.grid.gradient_per_scaled_voxel_lanes::<S>([
+            gx[0] * inverse - gx[1] * inverse,
+            gy[0] * inverse - gy[1] * inverse,
+            gz[0] * inverse - gz[1] * inverse,
+        ])
     }
 
     #[inline(always)]

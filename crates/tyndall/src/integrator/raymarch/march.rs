@@ -1,32 +1,37 @@
 //! Marching along packets of view rays, with shadow rays from positions in matter.
 
 use super::Settings;
+use super::cached::CachedLight;
+use super::shadows::CachedShadows;
 use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::Stop;
 use crate::integrator::view_march::{Coverage, OPAQUE, Shader, composite};
-use crate::math::{Ray, Rgb, Vec3};
+use crate::math::{Ray, Rgb, Vec3, cast};
 use crate::medium::{PacketMarch, PacketSample, Track};
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes, Level, MOST_LANES};
 use fearless_simd::prelude::*;
 
 /// The ray marcher with its fixed sample points on lights.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct RayMarch {
     /// World units.
-    step: f32,
+    pub(super) step: f32,
     /// Points in the unit square, the same for every shaded position.
     light_points: Vec<[f32; 2]>,
-    level: Level,
+    /// `None` if every shadow ray is marched.
+    pub(super) shadows: Option<CachedShadows>,
+    pub(super) level: Level,
 }
 
 impl RayMarch {
     /// For a scene, with these vector instructions.
     #[must_use]
     pub fn of_scene(scene: &Scene, settings: &Settings, level: Level) -> Self {
-        let Settings { step, light_samples } = *settings;
-        let light_points = (0..light_samples).map(|i| hammersley(i, light_samples)).collect();
-        Self { step: step * scene.medium.volume().grid().voxel_size(), light_points, level }
+        let Settings { step, light_samples, .. } = *settings;
+        let light_points = points_on_lights(light_samples as usize);
+        let shadows = CachedShadows::of_scene(scene, settings);
+        Self { step: step * scene.medium.volume().grid().voxel_size(), light_points, shadows, level }
     }
 
     /// Adds rays to the pixels of a tile until it reaches the goal; see [`crate::integrator::Method::refine`].
@@ -41,7 +46,7 @@ impl RayMarch {
         self.level.run(MarchPixels { raymarch: self, scene, tile, pending, goal, stop });
     }
 
-    /// The radiance that arrives along a world ray.
+    /// The radiance that arrives along a world ray, with exact shadows.
     #[must_use]
     pub fn march(&self, scene: &Scene, ray: &Ray) -> PixelSample {
         self.level.run(MarchOne { raymarch: self, scene, packet: Packet::new(scene, [*ray].into_iter()) })
@@ -49,7 +54,7 @@ impl RayMarch {
 
     /// A pixel's `sample`-th ray. Samples vary only the position in the pixel and on the lens; the first goes through
     /// the middle of the pixel.
-    fn ray(scene: &Scene, [x, y]: [u32; 2], sample: u32) -> Ray {
+    pub(super) fn ray(scene: &Scene, [x, y]: [u32; 2], sample: u32) -> Ray {
         let [in_x, in_y] = spread(sample);
         let film = [x as f32 + in_x, y as f32 + in_y];
         // Lens points have their own lattice, shifted per pixel so that defocus shows as grain, not as ghost images.
@@ -61,14 +66,21 @@ impl RayMarch {
     /// Marches a packet to its end, or until a stop, but for at least one shadow ray or position; returns whether it has
     /// ended.
     #[inline(always)]
-    fn go_on<S: Lanes>(&self, simd: S, scene: &Scene, packet: &mut Packet, stop: &Stop) -> bool {
+    fn go_on<S: Lanes>(
+        &self,
+        simd: S,
+        scene: &Scene,
+        packet: &mut Packet,
+        cached: Option<&mut CachedLight>,
+        stop: &Stop,
+    ) -> bool {
         let mut seen = Coverage {
             alpha: S::f32s::from_slice(simd, &packet.alpha[..S::WIDTH]),
             depth: S::f32s::from_slice(simd, &packet.depth[..S::WIDTH]),
         };
         let mut march = PacketMarch::<S>::new(simd, &scene.medium, &packet.tracks, self.step);
         march.go_to(S::i32s::from_slice(simd, &packet.k[..S::WIDTH]));
-        let mut shader = DirectShader { raymarch: self, scene, packet, stop, moved: false };
+        let mut shader = DirectShader { raymarch: self, scene, packet, cached, stop, moved: false };
         let stopped = composite(simd, &mut march, &mut seen, &mut shader, &mut ());
         packet.keep::<S>(stopped.unwrap_or(march.step()), &seen);
         stopped.is_none()
@@ -132,21 +144,29 @@ struct LitSoFar {
 }
 
 /// Adds emission and singly scattered light to a packet's rays.
-struct DirectShader<'a> {
+struct DirectShader<'a, 'b> {
     raymarch: &'a RayMarch,
     scene: &'a Scene,
     packet: &'a mut Packet,
+    /// `None` for exact shadows.
+    cached: Option<&'a mut CachedLight<'b>>,
     stop: &'a Stop<'a>,
     /// Whether a position has been shaded since the march resumed; ensures progress however often it is stopped.
     moved: bool,
 }
 
-impl<S: Lanes> Shader<S, ()> for DirectShader<'_> {
+impl<S: Lanes> Shader<S, ()> for DirectShader<'_, '_> {
     #[inline(always)]
     fn shade(&mut self, simd: S, sample: &PacketSample<S>, covered: S::f32s, _: &mut ()) -> bool {
-        let Self { raymarch, scene, packet, stop, moved } = self;
+        let Self { raymarch, scene, packet, cached, stop, moved } = self;
         let transfer = scene.medium.transfer();
-        if scene.render.max_scatter > 0 {
+        if let Some(cached) = cached {
+            if *moved && stop.reached() {
+                return false;
+            }
+            cached.add(simd, sample, covered, &packet.rays, &mut packet.radiance);
+            *moved = true;
+        } else if scene.render.max_scatter > 0 {
             for lane in packet.shaded..packet.count {
                 let covered = covered.as_slice()[lane];
                 if covered <= 0.0 {
@@ -189,7 +209,7 @@ impl<S: Lanes> Shader<S, ()> for DirectShader<'_> {
 pub struct Packet {
     count: usize,
     rays: [Ray; MOST_LANES],
-    tracks: [Track; MOST_LANES],
+    pub(super) tracks: [Track; MOST_LANES],
     /// The step at which to resume.
     k: [i32; MOST_LANES],
     /// Number of lanes whose position at that step has already been shaded.
@@ -203,7 +223,7 @@ pub struct Packet {
 }
 
 impl Packet {
-    fn new(scene: &Scene, rays: impl Iterator<Item = Ray>) -> Self {
+    pub(super) fn new(scene: &Scene, rays: impl Iterator<Item = Ray>) -> Self {
         let mut packet = Self {
             count: 0,
             rays: [Ray::default(); MOST_LANES],
@@ -258,12 +278,13 @@ impl Kernel for MarchPixels<'_> {
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
         let Self { raymarch, scene, tile, pending, goal, stop } = self;
+        let mut cached = raymarch.shadows.as_ref().map(|shadows| shadows.light(scene));
         while !tile.has_reached(goal) {
             let mut packet = pending.take().unwrap_or_else(|| {
                 let (pixels, sample) = (tile.next(goal, S::WIDTH), tile.samples());
                 Box::new(Packet::new(scene, pixels.map(|pixel| RayMarch::ray(scene, pixel, sample))))
             });
-            if !raymarch.go_on(simd, scene, &mut packet, stop) {
+            if !raymarch.go_on(simd, scene, &mut packet, cached.as_mut(), stop) {
                 *pending = Some(packet);
                 return;
             }
@@ -288,9 +309,15 @@ impl Kernel for MarchOne<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(mut self, simd: S) -> PixelSample {
-        while !self.raymarch.go_on(simd, self.scene, &mut self.packet, &Stop::never()) {}
+        while !self.raymarch.go_on(simd, self.scene, &mut self.packet, None, &Stop::never()) {}
         self.packet.sample(self.scene, 0)
     }
+}
+
+/// Points in the unit square, stratified in both coordinates.
+pub(super) fn points_on_lights(count: usize) -> Vec<[f32; 2]> {
+    let count = cast::fit_u32(count);
+    (0..count).map(|i| hammersley(i, count)).collect()
 }
 
 /// The `i`-th of `n` points of the Hammersley set: stratified in the first coordinate, and in the second for powers of two.

@@ -3,16 +3,20 @@
 //!
 //! Light from glowing matter that other matter scatters is left out.
 
+mod cached;
+mod light_points;
 mod march;
 mod settings;
+mod shadows;
 
 pub use march::RayMarch;
-pub use settings::Settings;
+pub use settings::{Settings, Shadows};
 
-use super::{Method, Resources, Stop};
+use super::{Edited, Limits, MemoryNeed, Method, MethodReport, PixelCounts, Resources, StageNames, Stop, Updated, settings_of};
 use crate::film::{Goal, Tile};
 use crate::scene::{Difference, Scene};
 use march::Packet;
+use shadows::Plan;
 
 impl Method for RayMarch {
     const NAME: &'static str = "raymarch";
@@ -27,17 +31,29 @@ impl Method for RayMarch {
     type TileState = Option<Box<Packet>>;
 
     fn draft(settings: &Settings) -> Settings {
-        Settings { step: settings.step.max(0.2), light_samples: settings.light_samples.min(4) }
+        let (step, light_samples) = (settings.step.max(0.2), settings.light_samples.min(4));
+        Settings { step, light_samples, ..*settings }
     }
 
-    fn notes(_: &Settings, scene: &Scene) -> Vec<&'static str> {
+    fn notes(settings: &Settings, scene: &Scene) -> Vec<&'static str> {
+        let mut notes = Vec::new();
         if scene.medium.transfer().emits() {
-            vec![
+            notes.push(
                 "`raymarch` leaves out light from glowing matter that other matter scatters; the default method includes it",
-            ]
-        } else {
-            Vec::new()
+            );
         }
+        notes.extend(Plan::of_scene(scene, settings).note());
+        notes
+    }
+
+    fn memory(settings: &Settings, scene: &Scene) -> Option<MemoryNeed> {
+        let bytes = Plan::of_scene(scene, settings).most_bytes(scene, settings)?;
+        Some(MemoryNeed {
+            bytes,
+            key: "render.raymarch.light_samples",
+            what: format!("shadows of {} points on each light", settings.light_samples),
+            fix: "fewer of them, or `render.raymarch.shadows = \"exact\"`",
+        })
     }
 
     fn new(scene: &Scene, settings: &Settings, resources: &Resources) -> Self {
@@ -49,6 +65,20 @@ impl Method for RayMarch {
         difference.view() || difference.light() || difference.majorants
     }
 
+    fn update(&mut self, edit: &Edited, tiles: &mut [Self::TileState], _: &Limits) -> Updated {
+        tiles.iter_mut().for_each(|pending| *pending = None);
+        self.update_shadows(edit, &settings_of::<Self>(edit.new));
+        Updated::Done
+    }
+
+    fn is_settling(&self, _: &Scene, _: u32) -> bool {
+        self.shadows.as_ref().is_some_and(|shadows| !shadows.is_ready())
+    }
+
+    fn prepare(&mut self, scene: &Scene, _: u32, limits: &Limits) -> bool {
+        self.prepare_shadows(scene, limits)
+    }
+
     fn refine(
         &self,
         scene: &Scene,
@@ -58,5 +88,11 @@ impl Method for RayMarch {
         stop: &Stop,
     ) {
         self.refine_tile(scene, tile, pending, goal, stop);
+    }
+
+    fn report(&self, _: &[Self::TileState], pixels: &PixelCounts) -> MethodReport {
+        let preparation = self.shadows.as_ref().map(|_| "shadows");
+        let stages = StageNames { preparation, ..StageNames::default() };
+        MethodReport { stages, ..MethodReport::of_pixels(pixels, 0) }
     }
 }

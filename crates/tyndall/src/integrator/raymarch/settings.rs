@@ -15,10 +15,24 @@ pub struct Settings {
     /// Fixed, stratified points on each area or environment light.
     #[schemars(range(min = 1, max = 4096))]
     pub light_samples: u32,
+
+    /// Where shadows come from.
+    pub shadows: Shadows,
+}
+
+/// Where the shadows of `raymarch` come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Shadows {
+    /// A grid that holds the transmittance to every point of every light, up to 512 MiB of it.
+    #[default]
+    Cached,
+    /// A ray from every sample to every point of every light: a hundred times slower.
+    Exact,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { step: 0.5, light_samples: 16 }
+        Self { step: 0.5, light_samples: 16, shadows: Shadows::Cached }
     }
 }

@@ -1,0 +1,640 @@
+//! Rays away from a light point, through the planes of a lattice.
+//!
+//! A fan's rays cross each plane in a regular grid, so that along a row of rays matter is read, and along a row of texels the result,
+//! with steps that do not change: as in shear-warp volume rendering \[Lacroute94\]. Each ray keeps what reached it all the way from the
+//! light, so that nothing is interpolated but matter, and once the transmittance, from rays to texels.
+
+use super::bricks::EDGE;
+use super::slab::{Slab, union};
+use super::{Aim, FULL, Surroundings};
+use crate::math::{Mat3, cast};
+use crate::simd::{Kernel, Lanes, Level, MOST_LANES, one_minus_exp};
+use fearless_simd::prelude::*;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Axes of a sweep through planes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Axes {
+    /// In rows, along the lanes.
+    pub u: usize,
+    /// From row to row of a plane.
+    pub v: usize,
+    /// From plane to plane.
+    pub w: usize,
+}
+
+impl Axes {
+    /// By x, y and z, from those along these axes.
+    #[inline(always)]
+    pub fn coordinates(self, u: usize, v: usize, w: usize) -> [usize; 3] {
+        let mut coordinates = [0; 3];
+        (coordinates[self.u], coordinates[self.v], coordinates[self.w]) = (u, v, w);
+        coordinates
+    }
+}
+
+/// The planes that a fan passes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Course {
+    pub axes: Axes,
+    /// Whether planes ascend: away from a light at lower coordinates.
+    pub ascending: bool,
+    /// Texels along the axes u, v and w.
+    pub texels: [usize; 3],
+}
+
+impl Course {
+    /// The `n`-th plane away from the light.
+    pub fn plane(&self, n: usize) -> usize {
+        if self.ascending { n } else { self.texels[2] - 1 - n }
+    }
+
+    /// Distance of the `n`-th plane from a coordinate, in planes; negative before it.
+    fn beyond(&self, n: usize, w: f32) -> f32 {
+        let away = self.plane(n) as f32 - w;
+        if self.ascending { away } else { -away }
+    }
+}
+
+/// Rays of near points beyond the first and the last that cross the lattice, so that every texel is between two.
+const MARGIN: i32 = 2;
+/// Rays of distant points beyond the lattice on either side of its first plane in a slab, as many as leave it there at most, and as
+/// [`MARGIN`].
+const PAD: usize = EDGE + 2;
+/// Values that a row of matter is continued by at either end: as many as a vector of rays may reach past it.
+const ROW_PAD: usize = 32;
+
+/// Where rays cross a plane: at `first + apart i`, along an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Crossings {
+    first: f32,
+    apart: f32,
+    /// 1 over `apart`.
+    inverse: f32,
+}
+
+impl Crossings {
+    #[inline(always)]
+    fn new(first: f32, apart: f32) -> Self {
+        Self { first, apart, inverse: 1.0 / apart }
+    }
+
+    #[inline(always)]
+    fn of(self, i: usize) -> f32 {
+        self.first + self.apart * i as f32
+    }
+
+    /// The rays, of so many, that cross between two coordinates, or next to that.
+    #[inline(always)]
+    fn rays_within(self, range: &Range<usize>, count: usize) -> Range<usize> {
+        if range.is_empty() {
+            return 0..0;
+        }
+        let ray = |at: f32| (at - self.first) * self.inverse;
+        let (from, to) = (ray(range.start as f32 - 1.0), ray(range.end as f32));
+        cast::index(from.floor()).min(count)..cast::index(to.ceil() + 1.0).min(count)
+    }
+}
+
+/// See the module.
+#[derive(Debug)]
+pub(super) struct Fan {
+    /// The light point's number.
+    pub point: usize,
+    course: Course,
+    aim: Aim,
+    /// Rays along u, in whole vectors, and v.
+    rays: [usize; 2],
+    /// For a near point, the slope from ray to ray, and the slopes of the first ones.
+    near: Slopes,
+    /// The first plane that lies beyond the light.
+    begin: usize,
+    /// Transmittance of each ray to the last plane passed, row by row.
+    state: Vec<f32>,
+    /// The same, a slab on.
+    next: Vec<f32>,
+    /// Transmittances to the planes of a slab, row by row of rays, and in it plane by plane.
+    passed: Vec<u8>,
+    /// Where rays cross these planes, along u and v; none where the light is still ahead.
+    planes: Vec<Grid>,
+}
+
+/// Slopes of rays from a near point, in lattice units per plane.
+#[derive(Clone, Copy, Debug)]
+struct Slopes {
+    first: [f32; 2],
+    apart: f32,
+}
+
+impl Fan {
+    /// With no plane passed yet.
+    pub fn new(point: usize, aim: Aim, course: Course) -> Self {
+        let [nu, nv, nw] = course.texels;
+        let mut fan = Self {
+            point,
+            course,
+            aim,
+            rays: [nu, nv].map(|n| n + 2 * PAD + 2 + EDGE),
+            near: Slopes { first: [0.0; 2], apart: 0.0 },
+            begin: 0,
+            state: Vec::new(),
+            next: Vec::new(),
+            passed: Vec::new(),
+            planes: Vec::new(),
+        };
+        if let Aim::At(p) = aim {
+            let Axes { u, v, w } = course.axes;
+            fan.begin = (0..nw).find(|&n| course.beyond(n, p[w]) > 0.0).unwrap_or(nw);
+            let (nearest, furthest) = (course.beyond(fan.begin.min(nw - 1), p[w]), course.beyond(nw - 1, p[w]));
+            fan.near.apart = 1.0 / furthest.max(1.0);
+            for (i, (a, n)) in [(u, nu), (v, nv)].into_iter().enumerate() {
+                // Slopes of rays to the texels at either end; of those above 1 other sweeps take care.
+                let slope = |x: f32, away: f32| ((x - p[a]) / away).clamp(-1.0, 1.0);
+                let last = (n - 1) as f32;
+                let least = slope(0.0, nearest).min(slope(0.0, furthest));
+                let most = slope(last, nearest).max(slope(last, furthest));
+                let from = (least / fan.near.apart).floor() - MARGIN as f32;
+                fan.near.first[i] = from * fan.near.apart;
+                fan.rays[i] = cast::index((most / fan.near.apart).ceil() + MARGIN as f32 - from) + 1;
+            }
+        }
+        fan.rays[0] = fan.rays[0].next_multiple_of(MOST_LANES);
+        fan
+    }
+
+    /// Bytes that its rays take.
+    pub fn bytes(&self) -> usize {
+        (2 * size_of::<f32>() + EDGE) * self.rays[0] * self.rays[1]
+    }
+
+    /// Whether a plane lies beyond the light.
+    fn has_begun(&self, n: usize) -> bool {
+        n >= self.begin
+    }
+
+    /// By how many places rays have moved in the grid from the first plane to the first of a slab: one that leaves at one end makes room for
+    /// one at the other.
+    #[inline(always)]
+    fn moved(&self, slab: usize, i: usize) -> f64 {
+        let Axes { u, v, w } = self.course.axes;
+        let Aim::Distant(d) = self.aim else { return 0.0 };
+        (f64::from(-d[[u, v][i]] / d[w].abs()) * slab as f64).floor()
+    }
+
+    /// Where rays cross the plane `n`, in the slab that begins with plane `slab`, along u (0) or v (1).
+    #[inline(always)]
+    fn crossings(&self, slab: usize, n: f64, i: usize) -> Crossings {
+        let Axes { u, v, w } = self.course.axes;
+        let a = [u, v][i];
+        match self.aim {
+            Aim::Distant(d) => {
+                let moved = f64::from(-d[a] / d[w].abs()) * n - self.moved(slab, i);
+                Crossings::new(cast::single(moved) - PAD as f32, 1.0)
+            }
+            Aim::At(p) => {
+                let first = self.course.beyond(slab, p[w]);
+                let away = first + cast::single(n - slab as f64);
+                Crossings::new(p[a] + self.near.first[i] * away, self.near.apart * away)
+            }
+        }
+    }
+
+    /// From a ray's crossing to where it came from, one plane before, along u or v: `first + apart i`.
+    #[inline(always)]
+    fn back(&self, i: usize) -> Crossings {
+        let Axes { u, v, w } = self.course.axes;
+        match self.aim {
+            Aim::Distant(d) => Crossings::new(d[[u, v][i]] / d[w].abs(), 0.0),
+            Aim::At(_) => Crossings::new(-self.near.first[i], -self.near.apart),
+        }
+    }
+
+    /// How much of the way to the plane before there is. The first plane is a face of the box, before which there is none.
+    #[inline(always)]
+    fn reach(&self, n: usize) -> f32 {
+        let reach = if n == 0 { 0.0 } else { 1.0 };
+        match self.aim {
+            Aim::Distant(_) => reach,
+            Aim::At(p) => self.course.beyond(n, p[self.course.axes.w]).clamp(0.0, reach),
+        }
+    }
+
+    /// Passes a slab, in parallel on the current pool.
+    pub fn pass(&mut self, slab: &Slab, around: &Surroundings, level: Level) {
+        self.planes.clear();
+        if !self.has_begun(slab.first + slab.count - 1) {
+            return;
+        }
+        let [rays, rows] = self.rays;
+        let (mut next, mut passed) = (std::mem::take(&mut self.next), std::mem::take(&mut self.passed));
+        next.resize(rays * rows, 0.0);
+        passed.resize(rays * rows * EDGE, 0);
+        let fan = &*self;
+        let row = next.par_chunks_exact_mut(rays).zip(passed.par_chunks_exact_mut(rays * EDGE));
+        row.with_min_len(8).enumerate().for_each(|(j, (kept, passed))| {
+            level.run(PassRow { fan, slab, around, j, kept, passed });
+        });
+        self.next = std::mem::replace(&mut self.state, next);
+        self.passed = passed;
+        for n in slab.first..slab.first + slab.count {
+            self.planes.push(Grid::new([0, 1].map(|i| self.crossings(slab.first, n as f64, i))));
+        }
+    }
+
+    /// The transmittances of a row of rays before a slab; ones beyond the grid's ends.
+    fn enter(&self, slab: &Slab, j: usize, out: &mut [f32]) {
+        let [moved_u, moved_v] =
+            [0, 1].map(|i| cast::truncate(cast::single(self.moved(slab.first, i) - self.moved(slab.before, i))));
+        let [nu, nv] = self.rays;
+        out.fill(1.0);
+        let row = i32::try_from(j).unwrap_or(i32::MAX) - moved_v;
+        let Some(row) = usize::try_from(row).ok().filter(|&row| row < nv) else { return };
+        let Some(state) = self.state.get(row * nu..).and_then(|rest| rest.get(..nu)) else { return };
+        // Ray `i` was number `i - moved`.
+        let by = moved_u.unsigned_abs() as usize;
+        let (from, to) = if moved_u < 0 { (by, 0) } else { (0, by) };
+        let count = nu.saturating_sub(by);
+        out[to..to + count].copy_from_slice(&state[from..from + count]);
+    }
+}
+
+/// Transmittances below this are 0, half of what a byte can tell.
+const LEAST: f32 = 0.5 / FULL;
+
+/// Mean extinction, over that at the end, of a way on which matter begins or ends: for a ramp that begins anywhere on it, a third; for an
+/// edge, a half. Scans have both; this keeps the light of all three in docs/speed.md within 1 %.
+const BORDER_MEAN: f32 = 0.46;
+
+struct PassRow<'a> {
+    fan: &'a Fan,
+    slab: &'a Slab,
+    around: &'a Surroundings,
+    /// The row's number.
+    j: usize,
+    /// Transmittances of the rays.
+    kept: &'a mut [f32],
+    /// See [`Fan::passed`].
+    passed: &'a mut [u8],
+}
+
+/// What a row of rays meets at a plane.
+#[derive(Clone, Debug, Default)]
+struct Met {
+    /// Rays that may meet matter.
+    rays: Range<usize>,
+    /// Extinction at each ray's crossing; 0 for other rays.
+    extinction: Vec<f32>,
+}
+
+impl Kernel for PassRow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, simd: S) {
+        let Self { fan, slab, around, j, kept, passed } = self;
+        let [rays, _] = fan.rays;
+        let mut row = vec![0.0; fan.course.texels[0] + 2 * ROW_PAD];
+        let mut transmittance = vec![0.0; rays];
+        fan.enter(slab, j, &mut transmittance);
+        let met = || Met { rays: 0..0, extinction: vec![0.0; rays] };
+        let (mut before, mut here) = (met(), met());
+        fan.meet(simd, slab, 0, j, &mut row, &mut before);
+        for (m, bytes) in passed.chunks_exact_mut(rays).take(slab.count).enumerate() {
+            let n = slab.first + m;
+            if !fan.has_begun(n) {
+                continue;
+            }
+            fan.meet(simd, slab, m + 1, j, &mut row, &mut here);
+            if n == fan.begin {
+                // The way begins at the light, near which matter is taken to be as here.
+                before.clone_from(&here);
+            }
+            let step = Step::new(fan, slab, around, n, j);
+            let range = union(&before.rays, &here.rays);
+            for first in (range.start / S::WIDTH * S::WIDTH..range.end).step_by(S::WIDTH) {
+                let vector = first..first + S::WIDTH;
+                let arriving = S::f32s::from_slice(simd, &transmittance[vector.clone()]);
+                let from = S::f32s::from_slice(simd, &before.extinction[vector.clone()]);
+                let to = S::f32s::from_slice(simd, &here.extinction[vector.clone()]);
+                let zero = S::f32s::splat(simd, 0.0);
+                let is_border = (from.simd_eq(zero)) | (to.simd_eq(zero));
+                let mean = (from + to) * is_border.select(S::f32s::splat(simd, BORDER_MEAN), S::f32s::splat(simd, 0.5));
+                let thickness = mean * step.lengths(simd, first);
+                let left = arriving - arriving * one_minus_exp(simd, thickness);
+                let left = left.simd_lt(S::f32s::splat(simd, LEAST)).select(S::f32s::splat(simd, 0.0), left);
+                left.store_slice(&mut transmittance[vector]);
+                let numbers: S::i32s = left.mul_add(S::f32s::splat(simd, FULL), S::f32s::splat(simd, 0.5)).to_int();
+                let (bytes, numbers) = (&mut bytes[first..first + S::WIDTH], numbers.as_slice());
+                for lane in 0..S::WIDTH {
+                    bytes[lane] = cast::low_u8(numbers[lane]);
+                }
+            }
+            std::mem::swap(&mut before, &mut here);
+        }
+        kept.copy_from_slice(&transmittance);
+    }
+}
+
+impl Fan {
+    /// The extinction where a row of rays crosses the `m`-th plane of a slab, of which the first is the one before. `row` is space.
+    #[inline(always)]
+    fn meet<S: Lanes>(&self, simd: S, slab: &Slab, m: usize, j: usize, row: &mut [f32], met: &mut Met) {
+        met.extinction[met.rays.clone()].fill(0.0);
+        let [nu, nv, _] = self.course.texels;
+        let [rays, _] = self.rays;
+        let n = (slab.first + m) as f64 - 1.0;
+        let at_v = self.crossings(slab.first, n, 1).of(j).clamp(0.0, (nv - 1) as f32);
+        let v = cast::index(at_v).min(nv.saturating_sub(2));
+        let rows = [v, (v + 1).min(nv - 1)];
+        let span = slab.span(m, rows);
+        let crossings = self.crossings(slab.first, n, 0);
+        met.rays = crossings.rays_within(&span, rays);
+        if met.rays.is_empty() {
+            return;
+        }
+        row.fill(0.0);
+        mix_rows(
+            simd,
+            [&slab.row(m, rows[0])[span.clone()], &slab.row(m, rows[1])[span.clone()]],
+            at_v - v as f32,
+            &mut row[ROW_PAD + span.start..ROW_PAD + span.end],
+        );
+        // Beyond the faces of the box, where only a part of a way counts, matter is as at the face.
+        let faces = [row[ROW_PAD], row[ROW_PAD + nu - 1]];
+        row[..ROW_PAD].fill(faces[0]);
+        row[ROW_PAD + nu..].fill(faces[1]);
+        let lane = S::f32s::from_fn(simd, |lane| lane as f32);
+        let start = crossings.first + ROW_PAD as f32;
+        for first in (met.rays.start / S::WIDTH * S::WIDTH..met.rays.end).step_by(S::WIDTH) {
+            let extinction = if crossings.apart == 1.0 {
+                let cell = start.floor();
+                let share = S::f32s::splat(simd, start - cell);
+                let cell = cast::index(cell) + first;
+                let (a, b) = (load(simd, row, cell), load(simd, row, cell + 1));
+                (b - a).mul_add(share, a)
+            } else {
+                let at = (lane + first as f32) * crossings.apart + start;
+                let at = at.max(S::f32s::splat(simd, 0.0)).min((nu + 2 * ROW_PAD - 2) as f32);
+                let cell: S::i32s = at.to_int();
+                between(simd, row, cell.bitcast(), at - cell.to_float::<S::f32s>())
+            };
+            extinction.store_slice(&mut met.extinction[first..first + S::WIDTH]);
+        }
+        // Rays of the first and the last vector that are none of these.
+        let aligned = met.rays.start / S::WIDTH * S::WIDTH..met.rays.end.next_multiple_of(S::WIDTH);
+        met.extinction[aligned.start..met.rays.start].fill(0.0);
+        met.extinction[met.rays.end..aligned.end].fill(0.0);
+    }
+}
+
+/// Numbers of a row from a place on; 0 past its end.
+#[inline(always)]
+fn load<S: Lanes>(simd: S, row: &[f32], first: usize) -> S::f32s {
+    match row.get(first..first + S::WIDTH) {
+        Some(numbers) => S::f32s::from_slice(simd, numbers),
+        None => S::f32s::from_fn(simd, |lane| row.get(first + lane).copied().unwrap_or(0.0)),
+    }
+}
+
+/// The ways of a row of rays from the plane before to a plane.
+struct Step<'a> {
+    around: &'a Surroundings,
+    axes: Axes,
+    /// Where they end along u, and the differences to where they began.
+    at_u: Crossings,
+    back_u: Crossings,
+    at_v: f32,
+    back_v: f32,
+    at_w: f32,
+    back_w: f32,
+    /// Last texel along u.
+    last_u: f32,
+    /// The part of the way, from its end, that is in the box, if faces along u are left aside.
+    begin: f32,
+    end: f32,
+    /// The square of a whole way's length: a polynomial in how far it goes along u.
+    squared: [f32; 3],
+    /// The length of all ways of parallel rays that meet neither faces along u nor cuts.
+    even: Option<f32>,
+}
+
+impl<'a> Step<'a> {
+    #[inline(always)]
+    fn new(fan: &Fan, slab: &Slab, around: &'a Surroundings, n: usize, j: usize) -> Self {
+        let Course { axes, texels: [nu, nv, _], ascending } = fan.course;
+        let at_v = fan.crossings(slab.first, n as f64, 1).of(j);
+        let back_v = fan.back(1).of(j);
+        let mut step = Self {
+            around,
+            axes,
+            at_u: fan.crossings(slab.first, n as f64, 0),
+            back_u: fan.back(0),
+            at_v,
+            back_v,
+            at_w: fan.course.plane(n) as f32,
+            back_w: if ascending { -1.0 } else { 1.0 },
+            last_u: (nu - 1) as f32,
+            begin: 0.0,
+            end: fan.reach(n),
+            squared: [0.0; 3],
+            even: None,
+        };
+        let (Axes { u, v, w }, back_w) = (axes, step.back_w);
+        let of = |a: usize, b: usize| Mat3::col(&around.metric, a)[b];
+        let constant = back_v * back_v * of(v, v) + 2.0 * back_v * back_w * of(v, w) + of(w, w);
+        step.squared = [constant, 2.0 * (back_v * of(u, v) + back_w * of(u, w)), of(u, u)];
+        // Where it is below the upper and above the lower face.
+        for (room, towards) in [((nv - 1) as f32 - at_v, back_v), (at_v, -back_v)] {
+            if towards > 0.0 {
+                step.end = step.end.min(room / towards);
+            } else if towards < 0.0 {
+                step.begin = step.begin.max(room / towards);
+            } else if room < 0.0 {
+                step.end = 0.0;
+            }
+        }
+        if step.back_u.apart == 0.0 && around.cuts.is_empty() {
+            let [constant, linear, square] = step.squared;
+            let to_u = step.back_u.first;
+            let length = ((to_u * square + linear) * to_u + constant).max(0.0).sqrt();
+            step.even = Some(length * (step.end - step.begin).max(0.0));
+        }
+        step
+    }
+
+    /// World lengths inside the box and the cuts, of the rays from number `first` on.
+    #[inline(always)]
+    fn lengths<S: Lanes>(&self, simd: S, first: usize) -> S::f32s {
+        let Self { around, axes: Axes { u, v, w }, at_u, back_u, at_v, back_v, at_w, back_w, .. } = *self;
+        if let Some(even) = self.even
+            && self.is_between_faces(first, S::WIDTH)
+        {
+            return S::f32s::splat(simd, even);
+        }
+        let splat = |x: f32| S::f32s::splat(simd, x);
+        let i = S::f32s::from_fn(simd, |lane| lane as f32) + first as f32;
+        let (at_u, to_u) = (i * at_u.apart + at_u.first, i * back_u.apart + back_u.first);
+        let mut part = (splat(self.begin), splat(self.end));
+        part = cut(simd, to_u, -at_u + self.last_u, part);
+        part = cut(simd, -to_u, at_u, part);
+        for half in &around.cuts {
+            let normal = [half.normal[u], half.normal[v], half.normal[w]];
+            let towards = to_u * normal[0] + (back_v * normal[1] + back_w * normal[2]);
+            let room = at_u * -normal[0] + (half.offset - at_v * normal[1] - at_w * normal[2]);
+            part = cut(simd, towards, room, part);
+        }
+        let [constant, linear, square] = self.squared;
+        let whole = ((to_u * square + linear) * to_u + constant).max(splat(0.0)).sqrt();
+        whole * (part.1 - part.0).max(splat(0.0))
+    }
+
+    /// Whether some parallel rays do not meet the box's faces along u.
+    #[inline(always)]
+    fn is_between_faces(&self, first: usize, count: usize) -> bool {
+        let ends = [self.at_u.of(first), self.at_u.of(first + count - 1)];
+        let back = self.back_u.first;
+        ends[0].min(ends[0] + back) >= 0.0 && ends[1].max(ends[1] + back) <= self.last_u
+    }
+}
+
+/// The part of a way on which `towards t <= room`; none is left where its end is before its beginning.
+#[inline(always)]
+fn cut<S: Lanes>(
+    simd: S,
+    towards: S::f32s,
+    room: S::f32s,
+    (begin, end): (S::f32s, S::f32s),
+) -> (S::f32s, S::f32s) {
+    let zero = S::f32s::splat(simd, 0.0);
+    let at = room / towards;
+    let never = towards.simd_eq(zero) & room.simd_lt(zero);
+    let begin = towards.simd_lt(zero).select(begin.max(at), begin);
+    let end = towards.simd_gt(zero).select(end.min(at), end);
+    (begin, never.select(zero, end))
+}
+
+/// Between an entry of a table and the next.
+#[inline(always)]
+fn between<S: Lanes>(simd: S, table: &[f32], entry: S::u32s, share: S::f32s) -> S::f32s {
+    let (a, b) = (simd.numbers(table, entry), simd.numbers(table, entry + 1));
+    (b - a).mul_add(share, a)
+}
+
+/// Between two rows.
+#[inline(always)]
+fn mix_rows<S: Lanes>(simd: S, [a, b]: [&[f32]; 2], share: f32, out: &mut [f32]) {
+    let width = S::WIDTH;
+    let whole = out.len() / width * width;
+    for i in (0..whole).step_by(width) {
+        let from = S::f32s::from_slice(simd, &a[i..i + width]);
+        let to = S::f32s::from_slice(simd, &b[i..i + width]);
+        let mixed = (to - from).mul_add(S::f32s::splat(simd, share), from);
+        mixed.store_slice(&mut out[i..i + width]);
+    }
+    for i in whole..out.len() {
+        out[i] = (b[i] - a[i]).mul_add(share, a[i]);
+    }
+}
+
+impl Fan {
+    /// The texels along u of a row that lie in the `n`-th plane within reach of the fan's rays; those for which another axis is steeper
+    /// are left to other sweeps.
+    #[inline(always)]
+    fn reached(&self, n: usize, row: usize) -> Range<usize> {
+        let [nu, _, _] = self.course.texels;
+        let Axes { u, v, w } = self.course.axes;
+        let Aim::At(p) = self.aim else { return 0..nu };
+        let away = self.course.beyond(n, p[w]);
+        if !self.has_begun(n) || (p[v] - row as f32).abs() > away {
+            return 0..0;
+        }
+        let from = cast::index((p[u] - away).ceil()).min(nu);
+        from..cast::index((p[u] + away).floor() + 1.0).clamp(from, nu)
+    }
+
+    /// Transmittances at a brick's row of texels in the `m`-th plane of a slab, in the bytes of a word, lowest first: those between the four
+    /// rays around each texel; and bytes of ones for the texels that the fan reaches, the others being zeros.
+    #[inline(always)]
+    pub fn texels(&self, slab: &Slab, m: usize, v: usize, brick: usize) -> [u64; 2] {
+        let first = brick * EDGE;
+        let [rays, rows] = self.rays;
+        let row = |j: usize| self.passed.get((j * EDGE + m) * rays..).unwrap_or(&[]);
+        match self.planes.get(m) {
+            Some(Grid::Parallel { before: [u, j], share: [share_u, share_v] }) => {
+                let (a, b) = (row(j + v), row(j + v + 1));
+                let (from, next) = (u + first, u + first + EDGE);
+                let (Some(a_next), Some(b_next)) = (a.get(next), b.get(next)) else { return [0; 2] };
+                let left = mix(word(a, from), word(b, from), *share_v);
+                let last = mix(u64::from(*a_next), u64::from(*b_next), *share_v);
+                [mix(left, left >> 8 | last << 56, *share_u), u64::MAX]
+            }
+            Some(Grid::Spread([at_u, at_v])) => {
+                let lower = ((v as f32 - at_v.first) * at_v.inverse).clamp(0.0, (rows - 2) as f32);
+                let j = cast::index(lower);
+                let (a, b, share_v) = (row(j), row(j + 1), part(lower - j as f32));
+                let reached = self.reached(slab.first + m, v);
+                let (mut texels, mut mask) = (0, 0);
+                for texel in first.max(reached.start)..(first + EDGE).min(reached.end) {
+                    let along = ((texel as f32 - at_u.first) * at_u.inverse).clamp(0.0, (rays - 2) as f32);
+                    let i = cast::index(along);
+                    let left = mix(u64::from(a[i]), u64::from(b[i]), share_v);
+                    let right = mix(u64::from(a[i + 1]), u64::from(b[i + 1]), share_v);
+                    let bits = 8 * (texel - first);
+                    texels |= mix(left, right, part(along - i as f32)) << bits;
+                    mask |= 0xFF << bits;
+                }
+                [texels, mask]
+            }
+            None => [0; 2],
+        }
+    }
+}
+
+/// How rays cross a plane, along u and v.
+#[derive(Clone, Copy, Debug)]
+enum Grid {
+    /// Rays of a distant point are as far from each other as texels.
+    Parallel {
+        /// Number of the last ray before the first texel.
+        before: [usize; 2],
+        /// Share of the ray after it there, in parts of 256.
+        share: [u64; 2],
+    },
+    Spread([Crossings; 2]),
+}
+
+impl Grid {
+    fn new([at_u, at_v]: [Crossings; 2]) -> Self {
+        if at_u.apart != 1.0 {
+            return Self::Spread([at_u, at_v]);
+        }
+        let before = [cast::index(-at_u.first), cast::index(-at_v.first)];
+        let share = [part(-at_u.first - before[0] as f32), part(-at_v.first - before[1] as f32)];
+        Self::Parallel { before, share }
+    }
+}
+
+/// Eight bytes of a row, the first one lowest; 0 where there are not so many.
+#[inline(always)]
+fn word(row: &[u8], first: usize) -> u64 {
+    row.get(first..).and_then(|rest| rest.first_chunk()).map_or(0, |bytes| u64::from_le_bytes(*bytes))
+}
+
+/// A share in parts of 256.
+#[inline(always)]
+fn part(share: f32) -> u64 {
+    u64::from(cast::truncate(share * 256.0 + 0.5).unsigned_abs())
+}
+
+/// Between the bytes of two words, by the second's share in parts of 256; rounded.
+#[inline(always)]
+fn mix(a: u64, b: u64, share: u64) -> u64 {
+    // Every second byte has room for a product of 16 bits.
+    const EVERY_SECOND: u64 = 0x00FF_00FF_00FF_00FF;
+    const HALF: u64 = 0x0080_0080_0080_0080;
+    let product = |a: u64, b: u64| a * (256 - share) + b * share + HALF;
+    let lower = product(a & EVERY_SECOND, b & EVERY_SECOND) >> 8 & EVERY_SECOND;
+    let upper = product(a >> 8 & EVERY_SECOND, b >> 8 & EVERY_SECOND) & !EVERY_SECOND;
+    lower | upper
+}

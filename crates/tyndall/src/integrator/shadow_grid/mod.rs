@@ -1,0 +1,244 @@
+//! Transmittance from the points of a lattice to points on lights.
+//!
+//! A *texel* is a lattice point; it holds one byte for each light point, side by side, so that a look-up interpolates vectors of them.
+//! Each light point has a byte of its own: one number for a whole light would not do, since at the skin of matter half of a large
+//! light is behind the surface.
+//!
+//! Texels are computed by sweeps, plane after plane away from the light, with rays that pass from plane to plane (`fan`); the cost does
+//! not depend on how far light travels. Only bricks of texels near matter are kept (`bricks`).
+
+mod bricks;
+mod fan;
+mod lattice;
+mod slab;
+mod sweeps;
+
+use bricks::{Bricks, EDGE};
+use lattice::Lattice;
+
+use super::Limits;
+use crate::math::{Mat3, Vec3, cast};
+use crate::medium::{HalfSpace, Medium};
+use crate::simd::{Lanes, Level, MOST_LANES};
+use crate::volume::Grid;
+use fearless_simd::prelude::*;
+use sweeps::{Sweeps, Texels};
+
+/// Light points of a texel are padded to a multiple of this, so that every vector level reads whole vectors.
+const PADDING: usize = MOST_LANES;
+
+/// What a byte holds for a transmittance of 1.
+const FULL: f32 = 255.0;
+
+/// Bytes of a texel with this many light points.
+pub(super) fn padded(points: usize) -> usize {
+    points.next_multiple_of(PADDING)
+}
+
+/// Where a light point is, in units of the lattice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Aim {
+    /// Infinitely far, in this direction.
+    Distant(Vec3),
+    /// At a position.
+    At(Vec3),
+}
+
+/// Where texels are, and what lies between them.
+#[derive(Debug)]
+struct Surroundings {
+    /// Products of the world vectors of the lattice's units: squared lengths follow.
+    metric: Mat3,
+    /// What is cut away, in units of the lattice.
+    cuts: Vec<HalfSpace>,
+}
+
+impl Surroundings {
+    fn new(lattice: &Lattice, medium: &Medium) -> Self {
+        let units = lattice.units(medium.volume().grid());
+        let spacing = Vec3::from_array(lattice.spacing());
+        // In units of the lattice, index space begins half a voxel from its first texel.
+        let cut = |half: &HalfSpace| HalfSpace {
+            normal: half.normal * spacing,
+            offset: half.offset + 0.5 * half.normal.element_sum(),
+        };
+        Self {
+            metric: units.transpose() * units,
+            cuts: medium.clip().half_spaces().iter().map(cut).collect(),
+        }
+    }
+}
+
+/// A lattice and those of its bricks that are kept.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Layout {
+    lattice: Lattice,
+    bricks: Bricks,
+}
+
+/// Finest spacing of texels, in voxels.
+const FINEST: f32 = 0.5;
+/// Coarsest spacing.
+const COARSEST: f32 = 8.0;
+/// By how much the next coarser spacing is wider.
+const COARSER: f32 = 1.1;
+
+impl Layout {
+    /// The finest one whose texels of so many light points take at most `most_bytes`; `None` if there is none that is fine enough.
+    pub fn within(medium: &Medium, points: usize, most_bytes: u64) -> Option<Self> {
+        let spacings = std::iter::successors(Some(FINEST), |voxels| Some(voxels * COARSER));
+        let layouts = spacings.take_while(|&voxels| voxels <= COARSEST).map(|voxels| {
+            let lattice = Lattice::new(medium.volume().grid(), voxels);
+            Self { bricks: Bricks::new(&lattice, medium), lattice }
+        });
+        layouts.into_iter().find(|layout| layout.bytes(points) <= most_bytes)
+    }
+
+    /// Bytes that its texels take.
+    pub fn bytes(&self, points: usize) -> u64 {
+        (self.bricks.texels() as u64).saturating_mul(padded(points) as u64)
+    }
+
+    /// Whether texels are more than a voxel apart.
+    pub fn is_coarse(&self) -> bool {
+        self.lattice.spacing().iter().any(|&voxels| voxels > 1.0)
+    }
+
+    /// Where a light is in units of the lattice.
+    pub fn aim_at(&self, grid: &Grid, position: Vec3) -> Aim {
+        Aim::At(self.lattice.from_index(grid.world_to_index(position)))
+    }
+
+    /// Where a distant light is, in a world direction, in units of the lattice.
+    pub fn aim_towards(&self, grid: &Grid, direction: Vec3) -> Aim {
+        Aim::Distant(grid.direction_to_index(direction) / Vec3::from_array(self.lattice.spacing()))
+    }
+}
+
+/// See the module.
+#[derive(Debug)]
+pub(super) struct ShadowGrid {
+    layout: Layout,
+    /// The light points, in lattice units.
+    aims: Vec<Aim>,
+    /// Bytes of a texel.
+    stride: usize,
+    /// Brick by brick; x fastest.
+    texels: Vec<u8>,
+    state: State,
+}
+
+/// How far the texels are.
+#[derive(Debug)]
+enum State {
+    Empty,
+    Sweeping(Sweeps),
+    Ready,
+}
+
+impl ShadowGrid {
+    /// With nothing computed yet; `aims` are in lattice units.
+    pub fn new(layout: Layout, aims: Vec<Aim>) -> Self {
+        Self { stride: padded(aims.len()), texels: Vec::new(), layout, aims, state: State::Empty }
+    }
+
+    /// Forgets all texels but keeps their memory.
+    pub fn restart(&mut self) {
+        self.state = State::Empty;
+    }
+
+    /// Whether another grid would hold the same, but for the medium.
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.layout == other.layout && self.aims == other.aims
+    }
+
+    /// Whether all texels are computed.
+    pub fn is_ready(&self) -> bool {
+        matches!(self.state, State::Ready)
+    }
+
+    /// Computes what is missing, in parallel on the current pool; false if stopped first.
+    pub fn complete(&mut self, medium: &Medium, level: Level, limits: &Limits) -> bool {
+        let Layout { lattice, bricks } = &self.layout;
+        if matches!(self.state, State::Empty) {
+            self.texels.resize(bricks.texels() * self.stride, 0);
+            self.state = State::Sweeping(Sweeps::new(&self.aims, lattice.texels()));
+        }
+        if let State::Sweeping(sweeps) = &mut self.state {
+            let around = Surroundings::new(lattice, medium);
+            let mut texels = Texels { lattice, bricks, bytes: &mut self.texels, stride: self.stride };
+            if !sweeps.complete(&self.aims, medium, &around, &mut texels, level, limits) {
+                return false;
+            }
+            self.state = State::Ready;
+        }
+        true
+    }
+
+    /// The texels around an index-space position.
+    #[inline(always)]
+    pub fn around(&self, position: Vec3) -> Corners<'_> {
+        let Layout { lattice, bricks } = &self.layout;
+        let position = lattice.from_index(position);
+        let texels = lattice.texels();
+        let [x, y, z] = [
+            Ends::new(position.x, texels[0]),
+            Ends::new(position.y, texels[1]),
+            Ends::new(position.z, texels[2]),
+        ];
+        let mut corners = Corners { texels: [&[]; 8], weights: [0.0; 8] };
+        for i in 0..8 {
+            let (ux, uy, uz) = (i & 1, i >> 1 & 1, i >> 2);
+            let [tx, ty, tz] = [x.lower + ux, y.lower + uy, z.lower + uz];
+            let within = (tx % EDGE) + EDGE * (ty % EDGE + EDGE * (tz % EDGE));
+            if let Some(brick) = bricks.first_texel([tx / EDGE, ty / EDGE, tz / EDGE]) {
+                let first = (brick + within) * self.stride;
+                corners.texels[i] = self.texels.get(first..first + self.stride).unwrap_or(&[]);
+            }
+            corners.weights[i] = x.shares[ux] * y.shares[uy] * (z.shares[uz] / FULL);
+        }
+        corners
+    }
+}
+
+/// Along an axis, the texels on either side of a position.
+#[derive(Clone, Copy, Debug)]
+struct Ends {
+    /// The coordinate of the lower one.
+    lower: usize,
+    /// Their shares.
+    shares: [f32; 2],
+}
+
+impl Ends {
+    #[inline(always)]
+    fn new(x: f32, texels: usize) -> Self {
+        let lower = cast::index(x).min(texels - 2);
+        let upper = (x - lower as f32).clamp(0.0, 1.0);
+        Self { lower, shares: [1.0 - upper, upper] }
+    }
+}
+
+/// The texels at the corners of a cell.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corners<'a> {
+    texels: [&'a [u8]; 8],
+    /// Their shares at the position, over [`FULL`].
+    weights: [f32; 8],
+}
+
+impl Corners<'_> {
+    /// Transmittance to the light points from number `first` on, a multiple of the number of lanes.
+    #[inline(always)]
+    pub fn transmittance<S: Lanes>(&self, simd: S, first: usize) -> S::f32s {
+        let mut kept = S::f32s::splat(simd, 0.0);
+        for i in 0..8 {
+            let numbers: S::i32s = simd.bytes(self.texels[i], first).bitcast();
+            kept = numbers.to_float::<S::f32s>().mul_add(S::f32s::splat(simd, self.weights[i]), kept);
+        }
+        kept
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,232 @@
+//! Sweeps through the lattice, away from light points.
+
+use super::bricks::{Bricks, EDGE};
+use super::fan::{Axes, Course, Fan};
+use super::slab::Slab;
+use super::{Aim, Lattice, Surroundings};
+use crate::integrator::Limits;
+use crate::medium::Medium;
+use crate::simd::{Kernel, Lanes, Level};
+use rayon::prelude::*;
+
+/// All sweeps, and how far they are.
+#[derive(Debug)]
+pub(super) struct Sweeps {
+    /// The last one comes first.
+    sweeps: Vec<Sweep>,
+}
+
+/// A sweep along an axis, for light points in whose direction rays cross its planes most steeply.
+#[derive(Debug)]
+struct Sweep {
+    course: Course,
+    points: Vec<usize>,
+    /// `None` before it begins.
+    under_way: Option<UnderWay>,
+}
+
+#[derive(Debug)]
+struct UnderWay {
+    fans: Vec<Fan>,
+    slab: Slab,
+}
+
+/// By the axis from plane to plane. Lanes go along x where they can, since matter is stored so.
+const AXES: [Axes; 3] = [Axes { u: 1, v: 2, w: 0 }, Axes { u: 0, v: 2, w: 1 }, Axes { u: 0, v: 1, w: 2 }];
+
+/// Memory of the rays of a sweep, as long as there are more than one fan.
+const MOST_BYTES: usize = 128 << 20;
+
+impl Aim {
+    /// Whether a sweep passes texels whose rays to the point cross its planes most steeply.
+    fn needs(&self, Axes { u, v, w }: Axes, ascending: bool, texels: [usize; 3]) -> bool {
+        match *self {
+            Self::Distant(d) => {
+                let steepest = d[w].abs() >= d[u].abs() && d[w].abs() >= d[v].abs();
+                // Of axes that are equally steep, the last.
+                let first = (w + 1..3).all(|a| d[a].abs() < d[w].abs());
+                steepest && first && (d[w] < 0.0) == ascending
+            }
+            Self::At(p) => {
+                let last = texels.map(|n| (n - 1) as f32);
+                let beside = |a: usize| (-p[a]).max(p[a] - last[a]).max(0.0);
+                let ahead = if ascending { last[w] - p[w] } else { p[w] };
+                ahead > 0.0 && ahead >= beside(u).max(beside(v))
+            }
+        }
+    }
+}
+
+/// Where the results of sweeps go.
+pub(super) struct Texels<'a> {
+    pub lattice: &'a Lattice,
+    pub bricks: &'a Bricks,
+    /// Brick by brick; in each, x fastest.
+    pub bytes: &'a mut [u8],
+    /// Bytes of a texel.
+    pub stride: usize,
+}
+
+impl Sweeps {
+    pub fn new(aims: &[Aim], texels: [usize; 3]) -> Self {
+        let mut sweeps: Vec<Sweep> = Vec::new();
+        for (axes, ascending) in AXES.into_iter().flat_map(|axes| [(axes, false), (axes, true)]) {
+            let course = Course { axes, ascending, texels: [axes.u, axes.v, axes.w].map(|a| texels[a]) };
+            let new = || Sweep { course, points: Vec::new(), under_way: None };
+            let (mut sweep, mut bytes) = (new(), 0);
+            for (point, aim) in aims.iter().enumerate().filter(|(_, aim)| aim.needs(axes, ascending, texels)) {
+                let more = Fan::new(point, *aim, course).bytes();
+                if !sweep.points.is_empty() && bytes + more > MOST_BYTES {
+                    sweeps.push(std::mem::replace(&mut sweep, new()));
+                    bytes = 0;
+                }
+                bytes += more;
+                sweep.points.push(point);
+            }
+            if !sweep.points.is_empty() {
+                sweeps.push(sweep);
+            }
+        }
+        Self { sweeps }
+    }
+
+    /// Goes on, in parallel on the current pool; false if stopped first.
+    pub fn complete(
+        &mut self,
+        aims: &[Aim],
+        medium: &Medium,
+        around: &Surroundings,
+        texels: &mut Texels,
+        level: Level,
+        limits: &Limits,
+    ) -> bool {
+        let stop = limits.stop();
+        while let Some(Sweep { course, points, under_way }) = self.sweeps.last_mut() {
+            let UnderWay { fans, slab } = under_way.get_or_insert_with(|| UnderWay {
+                fans: points.iter().map(|&point| Fan::new(point, aims[point], *course)).collect(),
+                slab: Slab::new(course),
+            });
+            loop {
+                if stop.reached_now() {
+                    return false;
+                }
+                if !slab.advance(course, texels.lattice, texels.bricks, medium, level) {
+                    break;
+                }
+                fans.par_iter_mut().for_each(|fan| fan.pass(slab, around, level));
+                write(course, fans, slab, texels, level);
+            }
+            self.sweeps.pop();
+        }
+        true
+    }
+}
+
+/// Writes the texels of a slab.
+fn write(course: &Course, fans: &[Fan], slab: &Slab, texels: &mut Texels, level: Level) {
+    let Texels { bricks, ref mut bytes, stride, .. } = *texels;
+    let Axes { u, v, w } = course.axes;
+    let kept = bytes.par_chunks_exact_mut(stride * EDGE * EDGE * EDGE).zip(bricks.kept().par_iter());
+    kept.filter(|(_, at)| at[w] == slab.layer).for_each(|(bytes, at)| {
+        level.run(WriteBrick { course, fans, slab, at: [at[u], at[v]], bytes, stride });
+    });
+}
+
+struct WriteBrick<'a> {
+    course: &'a Course,
+    fans: &'a [Fan],
+    slab: &'a Slab,
+    /// Its coordinates along u and v.
+    at: [usize; 2],
+    bytes: &'a mut [u8],
+    stride: usize,
+}
+
+impl Kernel for WriteBrick<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Lanes>(self, _: S) {
+        let Self { course, fans, slab, at: [brick_u, brick_v], bytes, stride } = self;
+        let Course { axes, texels: [_, nv, _], .. } = *course;
+        let apart = [axes.u, axes.v, axes.w].map(|a| stride * [1, EDGE, EDGE * EDGE][a]);
+        for fans in fans.chunk_by(|a, b| a.point / WORD == b.point / WORD) {
+            let first = fans[0].point / WORD * WORD;
+            for m in 0..slab.count {
+                let plane = course.plane(slab.first + m) % EDGE;
+                for v in brick_v * EDGE..((brick_v + 1) * EDGE).min(nv) {
+                    let out = &mut bytes[v % EDGE * apart[1] + plane * apart[2]..];
+                    if fans.len() > FEW {
+                        let (mut kept, mut masks) = ([0; WORD], [0; WORD]);
+                        for fan in fans {
+                            [kept[fan.point - first], masks[fan.point - first]] = fan.texels(slab, m, v, brick_u);
+                        }
+                        write_words(out, first, apart[0], kept, masks);
+                    } else {
+                        for fan in fans {
+                            let [kept, mask] = fan.texels(slab, m, v, brick_u);
+                            write_bytes(out, fan.point, apart[0], kept, mask);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Fans whose bytes are written one by one.
+const FEW: usize = 3;
+
+/// Writes the bytes of a point to eight texels, as far as the mask tells.
+#[inline(always)]
+fn write_bytes(out: &mut [u8], point: usize, apart: usize, kept: u64, mask: u64) {
+    let Some(out) = out.get_mut(point..point + (WORD - 1) * apart + 1) else { return };
+    if mask == u64::MAX {
+        for i in 0..WORD {
+            out[i * apart] = kept.to_le_bytes()[i];
+        }
+    } else {
+        for i in (0..WORD).filter(|i| mask.to_le_bytes()[*i] > 0) {
+            out[i * apart] = kept.to_le_bytes()[i];
+        }
+    }
+}
+
+/// Writes the bytes of points to eight texels, as far as the masks tell.
+#[inline(always)]
+fn write_words(out: &mut [u8], first: usize, apart: usize, kept: [u64; WORD], masks: [u64; WORD]) {
+    let Some(out) = out.get_mut(first..first + (WORD - 1) * apart + WORD) else { return };
+    let kept = transposed(kept);
+    let words = (0..WORD).map(|i| i * apart..i * apart + WORD);
+    if masks == [u64::MAX; WORD] {
+        for (word, kept) in words.zip(kept) {
+            out[word].copy_from_slice(&kept.to_le_bytes());
+        }
+    } else {
+        for ((word, kept), mask) in words.zip(kept).zip(transposed(masks)) {
+            let out = &mut out[word];
+            let before = out.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+            out.copy_from_slice(&(before & !mask | kept).to_le_bytes());
+        }
+    }
+}
+
+/// Bytes that are written together: of as many points as a row of a brick has texels.
+const WORD: usize = 8;
+const _: () = assert!(WORD == EDGE);
+
+/// Eight rows of eight bytes, as eight columns.
+#[inline(always)]
+fn transposed(mut rows: [u64; WORD]) -> [u64; WORD] {
+    // Swaps blocks of 4 x 4 bytes, then of 2 x 2, then bytes, on either side of the diagonal.
+    for (apart, mask) in [(4, 0x0000_0000_FFFF_FFFF), (2, 0x0000_FFFF_0000_FFFF), (1, 0x00FF_00FF_00FF_00FF_u64)] {
+        for i in 0..WORD {
+            if i & apart == 0 {
+                let swapped = (rows[i] >> (8 * apart) ^ rows[i + apart]) & mask;
+                rows[i + apart] ^= swapped;
+                rows[i] ^= swapped << (8 * apart);
+            }
+        }
+    }
+    rows
+}
