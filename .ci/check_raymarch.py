@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares `raymarch` (256 light samples) with `path --max-scatter 1` on real data.
+"""Compares `raymarch` (256 light samples, exact shadows) with `path --max-scatter 1` on real data.
 
   check_raymarch.py VOLUMES SCRATCH
 
@@ -16,6 +16,7 @@ program = pathlib.Path(__file__).parent.parent / "target/release/tyndall"
 SUN = '[{"type": "directional", "direction": [0.7, 0.6, -0.8], "irradiance": 5, "angle": 20}]'
 SHARP = SUN.replace("20", "0")
 COMMON = ["--size", "32x32", "--max-scatter", "1", "-q", "--set", f"lights={SUN}"]
+EXACT = ["--set", 'render.raymarch.shadows="exact"']
 B = 4
 
 def render(volume, name, *options):
@@ -31,7 +32,7 @@ def render(volume, name, *options):
 failed = False
 for volume in ["ct_head_promed_i16.nrrd", "mri_head_ch2.nii.gz"]:
     path, variance = render(volumes / volume, "path", "--integrator", "path", "--samples", "1024")
-    march = lambda step: render(volumes / volume, "march", "--integrator", "raymarch", "--samples", "12", "--set",
+    march = lambda step: render(volumes / volume, "march", "--integrator", "raymarch", "--samples", "12", *EXACT, "--set",
                                 f"render.raymarch.step={step}", "--set", "render.raymarch.light_samples=256")
     (coarse, _), (fine, few_rays) = march(1), march(0.5)
     allowed = 4 * np.sqrt(variance + few_rays) + 2 * abs(coarse - fine) + 0.01 * path + 1e-4
@@ -41,7 +42,7 @@ for volume in ["ct_head_promed_i16.nrrd", "mri_head_ch2.nii.gz"]:
     step_error = abs(coarse.mean() / fine.mean() - 1)
     sharp = lambda *options: render(volumes / volume, "sharp", "--set", f"lights={SHARP}", *options)[0].mean()
     truth = sharp("--integrator", "path", "--samples", "4096")
-    off = float(sharp("--integrator", "raymarch", "--samples", "64", "--set", "render.raymarch.step=0.25") / truth - 1)
+    off = float(sharp("--integrator", "raymarch", "--samples", "64", "--set", "render.raymarch.step=0.25", *EXACT) / truth - 1)
     good = abs(off) < 0.003 and share <= 0.01 and abs(mean) < 0.01 + 2 * step_error
     failed |= not good
     print(f"{'ok    ' if good else 'FAILED'} {volume:28} sharp sun: mean off by {off:+.5f}; wide sun: {mean:+.5f}, blocks off {share:.4f}, worst {worst:.2f} of what is allowed", flush=True)

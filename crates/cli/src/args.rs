@@ -255,12 +255,12 @@ pub struct BenchOptions {
 
     /// Measure only this table of the set; repeatable
     ///
-    /// Their names: core: sampling, flight, paths, threads, latency, costs, growth; looks: edits, look; historygrams: cornell-box,
-    /// ct, hard, figure-7, figure-8, figure-9, defaults, scans, gathering, path.
+    /// Their names: core: sampling, flight, paths, threads, latency, costs, growth, first-pictures; looks: edits, look; historygrams:
+    /// cornell-box, ct, hard, figure-7, figure-8, figure-9, defaults, scans, gathering, path.
     #[arg(long = "table", value_name = "NAME")]
     pub tables: Vec<String>,
 
-    /// Folder with scans for the table `scans`: ct_chest_aorta_i16.nrrd, ct_head_promed_i16.nrrd, or one of them
+    /// Folder with scans for the tables `first-pictures` and `scans`: ct_chest_aorta_i16.nrrd, ct_head_promed_i16.nrrd, or one of them
     ///
     /// The MRI of examples/data is always measured.
     #[arg(long, value_name = "DIR")]

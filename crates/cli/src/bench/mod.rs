@@ -202,6 +202,7 @@ const CORE: &[Table] = &[
     table("latency", 35.0, |run| core::latency(&run.effort, run.level)),
     table("costs", 10.0, |run| scene_edits::costs(&run.effort, run.level)),
     table("growth", 30.0, |run| growth::curves(&run.effort, run.level)),
+    table("first-pictures", 60.0, |run| scans::first_pictures(&run.effort, run.level, &run.scans)),
 ];
 
 const LOOKS: &[Table] = &[
@@ -225,7 +226,7 @@ const HISTORYGRAMS: &[Table] = &[
 /// Measures the tables and prints each as soon as it is complete, or all at the end as JSON.
 pub fn run(options: &BenchOptions) -> Result<(), Failure> {
     let tables = chosen(options)?;
-    let scans = match tables.iter().any(|table| table.name == SCANS) {
+    let scans = match tables.iter().any(|table| SCANS.contains(&table.name)) {
         true => scans::find(options.data.as_deref())?,
         false => Vec::new(),
     };
@@ -259,8 +260,8 @@ fn measure(tables: &[&Table], run: &Run, options: &BenchOptions) -> Result<(), F
     Ok(())
 }
 
-/// The table that measures scans.
-const SCANS: &str = "scans";
+/// The tables that measure scans.
+const SCANS: [&str; 2] = ["first-pictures", "scans"];
 
 /// The table that measures the files of the command line.
 const EDITS: &str = "edits";
@@ -293,9 +294,10 @@ fn chosen(options: &BenchOptions) -> Result<Vec<&'static Table>, Failure> {
             path_name(file)
         )));
     }
-    if let Some(folder) = options.data.as_ref().filter(|_| !measures(SCANS)) {
+    if let Some(folder) = options.data.as_ref().filter(|_| !SCANS.into_iter().any(measures)) {
+        let [first, edits] = SCANS;
         return Err(Failure::usage(format!(
-            "--data {}: only the table `{SCANS}` of `historygrams` measures scans; name it, or leave the option out",
+            "--data {}: only the tables `{first}` of `core` and `{edits}` of `historygrams` measure scans; name one, or leave the option out",
             path_name(folder)
         )));
     }

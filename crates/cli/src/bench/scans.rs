@@ -1,4 +1,5 @@
-//! Edits of `photon` on scans, whose many values share groups of the Historygrams and whose matter fills much of the box.
+//! Scans: the first picture of each method, and edits of `photon`, since their many values share groups of the Historygrams and their
+//! matter fills much of the box.
 
 use super::Row;
 use super::edit::{Against, Edit, Live};
@@ -8,8 +9,11 @@ use super::timing::Effort;
 use crate::Failure;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use tyndall::integrator::METHODS;
 use tyndall::message::path_name;
+use tyndall::session::Budget;
 use tyndall::simd::Level;
+use tyndall_live::document;
 
 /// A scan and its transfer function.
 pub struct Scan {
@@ -202,6 +206,54 @@ fn of_scan(effort: &Effort, level: Level, Scan { kind, file }: &Scan) -> Result<
         }
     }
     Ok(rows)
+}
+
+/// The first picture of each method of a bare file, and what an edit of the transfer function costs `raymarch`.
+pub fn first_pictures(effort: &Effort, level: Level, scans: &[Scan]) -> Result<Vec<Row>, Failure> {
+    const TABLE: &str = "first pictures of bare files, 512 x 512 pixels, default settings; two threads";
+    /// Seconds to the whole picture of `raymarch`; an edit should take half of that.
+    const RAYMARCH: f64 = 2.5;
+    let mut rows = Vec::new();
+    let side = effort.pick(512, 64);
+    for Scan { kind, file } in scans {
+        effort.show(&format!("{}, loading", kind.name));
+        let value = json!({ "version": 1, "volume": { "path": file }, "film": { "size": [side, side] } });
+        let bench = Bench::new(value, 2)?;
+        for method in METHODS {
+            let case = format!("{}, {}", kind.name, method.name);
+            effort.show(&case);
+            let patch = json!({ "render": { "integrator": method.name } });
+            let scene = bench.scene(&patch)?;
+            // Without noise a picture is whole when its edges are smooth; with noise the first sample is a picture.
+            let samples = if method.has_noise { 1 } else { method.default_samples };
+            let seconds = effort.seconds(&mut || drop(bench.render(&scene, level, samples)));
+            let row = Row::new(TABLE, case.clone(), format_samples(samples), "s", seconds);
+            if method.has_noise {
+                rows.push(row);
+                continue;
+            }
+            rows.push(row.at_most(RAYMARCH));
+            let edits = [1.0, 0.5]
+                .map(|share| document::apply(&patch, &kind.transfer(kind.tissues[0].albedo, share)));
+            let edited = [bench.scene(&edits[0])?, bench.scene(&edits[1])?];
+            let mut session = bench.render(&edited[0], level, samples);
+            let mut turn = 0;
+            let seconds = effort.seconds(&mut || {
+                turn += 1;
+                session.set_scene(edited[turn % 2].clone());
+                session.refine(&Budget::samples(samples));
+            });
+            rows.push(
+                Row::new(TABLE, case, "after an edit of opacity", "s", seconds).at_most(0.5 * RAYMARCH),
+            );
+        }
+    }
+    Ok(rows)
+}
+
+/// What is measured of a first picture.
+fn format_samples(samples: u32) -> &'static str {
+    if samples == 1 { "first sample" } else { "all samples" }
 }
 
 /// See [`Edit::patience`].

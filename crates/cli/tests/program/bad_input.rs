@@ -264,7 +264,7 @@ fn an_option_at_fault_is_named() {
         (vec!["completions", "no-such"], "'no-such'"),
         (vec!["presets", "all"], "'all'"),
         (vec!["bench", "core", "a.nrrd"], "only `looks`"),
-        (vec!["bench", "core", "--data", ".."], "`scans` of `historygrams`"),
+        (vec!["bench", "looks", "--data", ".."], "`scans` of `historygrams`"),
         (vec!["bench", "historygrams", "--data", ".."], "neither ct_chest_aorta_i16.nrrd nor ct_head"),
         (vec!["bench", "looks", "--table", "scans"], "expected one of edits, look"),
         (vec!["bench", "all", "--quiet", "--progress"], "'--quiet'"),

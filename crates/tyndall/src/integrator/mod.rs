@@ -23,8 +23,8 @@ mod plain;
 
 pub(crate) use disposal::drop_elsewhere;
 pub(crate) use engine::Engine;
-use engine::settings_of;
 pub use engine::MethodEntry;
+use engine::settings_of;
 pub use method::{
     Edited, ItemChanges, KeptCount, KeptItems, MemoryNeed, Method, MethodReport, MovedKey, NamedCount,
     PixelCounts, Resources, SettingProblem, StageNames, Updated, WorkShare,

@@ -21,7 +21,11 @@ pub fn truncate(x: f32) -> i32 {
 /// The lowest byte of a whole number.
 #[inline]
 #[must_use]
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the lowest byte is what is documented")]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the lowest byte is what is documented"
+)]
 pub fn low_u8(x: i32) -> u8 {
     x as u8
 }

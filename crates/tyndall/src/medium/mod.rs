@@ -22,9 +22,9 @@ pub use marched_flight::MarchedCollision;
 
 use crate::math::{Binade, Interval, Ray, Vec3};
 use crate::scattering::{Brdf, Event, Phase, Surface, surface_share};
-use crate::simd::Lanes;
+use crate::simd::{Lanes, one_minus_exp};
 use crate::transfer::{Optics, TransferFunction};
-use crate::volume::{ScaledGradient, Volume};
+use crate::volume::Volume;
 use fearless_simd::prelude::*;
 use std::sync::Arc;
 
@@ -262,57 +262,47 @@ impl Medium {
     #[inline]
     #[must_use]
     pub fn event(&self, p: Vec3, optics: &Optics) -> Event {
-        let gradient = if optics.surface > 0.0 { self.gradient(p) } else { None };
-        self.event_with(optics, gradient)
-    }
-
-    /// The data's gradient at an index-space position; `None` where it vanishes.
-    #[inline(always)]
-    fn gradient(&self, p: Vec3) -> Option<RelativeGradient> {
-        let ScaledGradient { normal, length, scale } = self.volume.gradient(p)?;
-        Some(RelativeGradient { normal, length: length * scale.over(Binade::of(self.gradient_range)) })
-    }
-
-    /// The data's gradient at an index-space position per lane: along the world's axes, as long as [`RelativeGradient::length`] says.
-    #[inline(always)]
-    pub(crate) fn gradient_lanes<S: Lanes>(&self, simd: S, p: [S::f32s; 3]) -> [S::f32s; 3] {
-        self.volume.gradient_lanes(simd, p, Binade::of(self.gradient_range))
-    }
-
-    /// [`Self::event`] where the gradient is known; it matters only where `optics` has a surface.
-    #[inline(always)]
-    #[must_use]
-    pub(crate) fn event_with(&self, optics: &Optics, gradient: Option<RelativeGradient>) -> Event {
         let surface =
             Surface { albedo: optics.albedo, specular: optics.specular, roughness: optics.roughness };
         let mut event = Event { phase: self.phase, brdf: self.brdf, surface, normal: None, q: 0.0 };
-        if let Some(RelativeGradient { normal, length }) = gradient.filter(|_| optics.surface > 0.0) {
-            let range = self.gradient_range * Binade::of(self.gradient_range).inverse();
+        if optics.surface > 0.0 {
+            let Some(gradient) = self.volume.gradient(p) else { return event };
+            let range = Binade::of(self.gradient_range);
+            let length = gradient.length * gradient.scale.over(range);
+            let range = self.gradient_range * range.inverse();
             let h = self.volume.grid().scaled_voxel_size();
             event.q = surface_share(optics.surface, self.gradient_factor, length, h, range);
-            event.normal = (event.q > 0.0).then_some(normal);
+            event.normal = (event.q > 0.0).then_some(gradient.normal);
         }
         event
     }
-}
 
-/// A gradient of the data, measured against the medium's range for gradients.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct RelativeGradient {
-    /// Its direction, a unit vector.
-    pub normal: Vec3,
-    /// Its length, in values of the binade of [`Medium::gradient_range`] per unit of length in which a voxel measures
-    /// [`Grid::scaled_voxel_size`](crate::volume::Grid::scaled_voxel_size).
-    pub length: f32,
-}
-
-impl RelativeGradient {
-    /// From a vector of that length; `None` for 0.
+    /// Where the data have edges, at an index-space position per lane: the same as [`Self::event`] but for rounding.
     #[inline(always)]
-    pub fn of(gradient: Vec3) -> Option<Self> {
-        let length = gradient.length();
-        (length > 0.0).then(|| Self { normal: gradient / length, length })
+    pub(crate) fn edges_lanes<S: Lanes>(&self, simd: S, p: [S::f32s; 3]) -> EdgeLanes<S> {
+        let zero = S::f32s::splat(simd, 0.0);
+        if !self.transfer.reflects() || self.gradient_range <= 0.0 {
+            return EdgeLanes { normal: [zero; 3], share: zero };
+        }
+        let scale = Binade::of(self.gradient_range);
+        let [x, y, z] = self.volume.gradient_lanes(simd, p, scale);
+        let length = x.mul_add(x, y.mul_add(y, z * z)).sqrt();
+        let inverse = length.simd_gt(zero).select(S::f32s::splat(simd, 1.0) / length, zero);
+        // As in `surface_share`.
+        let range = self.gradient_range * scale.inverse();
+        let steepness = self.gradient_factor * self.volume.grid().scaled_voxel_size() / range;
+        let share = one_minus_exp(simd, length * steepness);
+        EdgeLanes { normal: [x * inverse, y * inverse, z * inverse], share }
     }
+}
+
+/// Edges of the data at a position per lane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct EdgeLanes<S: Lanes> {
+    /// Unit gradients, along the world's axes; 0 where the data are even.
+    pub normal: [S::f32s; 3],
+    /// [`surface_share`] of matter that is all surface.
+    pub share: S::f32s,
 }
 
 #[cfg(test)]

@@ -20,7 +20,6 @@ pub mod procedural;
 
 pub use bricks::Bricks;
 pub use cells::Cells;
-pub(crate) use gradient::ScaledGradient;
 pub use grid::{Grid, GridError, Space};
 pub use statistics::Histogram;
 pub use value_bins::ValueBins;

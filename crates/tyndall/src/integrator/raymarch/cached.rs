@@ -3,8 +3,8 @@
 use super::light_points::{Arrivals, LightPoints};
 use crate::integrator::shadow_grid::{Corners, ShadowGrid};
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::{PacketSample, RelativeGradient};
-use crate::scattering::{Brdf, Event};
+use crate::medium::PacketSample;
+use crate::scattering::{Brdf, Event, Surface};
 use crate::scene::Scene;
 use crate::simd::{Lanes, MOST_LANES};
 use fearless_simd::prelude::*;
@@ -35,23 +35,33 @@ impl<'a> CachedLight<'a> {
         radiance: &mut [Rgb; MOST_LANES],
     ) {
         let medium = &*self.scene.medium;
-        let [gx, gy, gz] = medium.gradient_lanes(simd, sample.position);
-        let [x, y, z] = &sample.position;
+        let edges = medium.edges_lanes(simd, sample.position);
+        let places = self.grid.places(simd, sample.position);
+        let vectors = self.points.vectors::<S>();
+        let ([x, y, z], [nx, ny, nz]) = (&sample.position, &edges.normal);
         for lane in 0..S::WIDTH {
             let covered = covered.as_slice()[lane];
             if covered <= 0.0 {
                 continue;
             }
+            let optics = medium.transfer().optics(sample.value.as_slice()[lane]);
+            let q = optics.surface * edges.share.as_slice()[lane];
+            let normal = Vec3::new(nx.as_slice()[lane], ny.as_slice()[lane], nz.as_slice()[lane]);
+            let event = Event {
+                phase: medium.phase(),
+                brdf: medium.brdf(),
+                surface: Surface {
+                    albedo: optics.albedo,
+                    specular: optics.specular,
+                    roughness: optics.roughness,
+                },
+                normal: (q > 0.0).then_some(normal),
+                q,
+            };
             let position = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
-            let value = sample.value.as_slice()[lane];
-            let optics = medium.transfer().optics(value);
-            let gradient = Vec3::new(gx.as_slice()[lane], gy.as_slice()[lane], gz.as_slice()[lane]);
-            let event = medium.event_with(&optics, RelativeGradient::of(gradient));
-            let here = medium.volume().grid().index_to_world(position);
-            let arriving = self.points.arriving(here, &mut self.space);
-            let corners = self.grid.around(position);
-            let count = self.points.vectors::<S>();
-            let light = scattered(simd, &event, -rays[lane].direction, arriving, &corners, count);
+            let arriving = self.points.arriving(medium.volume().grid(), position, &mut self.space);
+            let corners = self.grid.corners(&places, lane);
+            let light = scattered(simd, &event, -rays[lane].direction, arriving, &corners, vectors);
             radiance[lane] += (optics.emitted() + light) * covered;
         }
     }
@@ -68,62 +78,54 @@ fn scattered<S: Lanes>(
     vectors: usize,
 ) -> Rgb {
     let zero = S::f32s::splat(simd, 0.0);
-    let normal = event.normal.filter(|_| event.q > 0.0);
-    let is_glossy = normal.is_some() && event.brdf != Brdf::Lambert;
+    let Event { phase, brdf, surface, normal, q } = *event;
+    let q = if normal.is_some() { q } else { 0.0 };
+    let is_glossy = q > 0.0 && brdf != Brdf::Lambert;
     // The normal on the camera's side.
     let side = normal.map_or(Vec3::ZERO, |n| n * 1.0_f32.copysign(n.dot(w_out)));
-    let (mut by_matter, mut by_surface) = ([zero; 3], [zero; 3]);
+    // What scatters evenly shares the albedo.
+    let (by_matter, by_surface) = (1.0 - q, if is_glossy { 0.0 } else { q * FRAC_1_PI });
+    let mut even = [zero; 3];
     let mut glossy = Rgb::BLACK;
     for i in 0..vectors {
         let light = arriving.lanes(simd, i);
         let [dx, dy, dz] = light.direction;
         let kept = shadows.transmittance(simd, i * S::WIDTH);
-        let phase = event.phase.eval_between_lanes(simd, [-dx, -dy, -dz], w_out) * kept;
+        let mut scattered = phase.eval_between_lanes(simd, [-dx, -dy, -dz], w_out) * by_matter;
+        if by_surface > 0.0 {
+            let cos = dx.mul_add(side.x, dy.mul_add(side.y, dz * side.z));
+            scattered = cos.max(zero).mul_add(by_surface, scattered);
+        }
+        let scattered = scattered * kept;
         let [r, g, b] = light.radiance;
-        by_matter = [
-            r.mul_add(phase, by_matter[0]),
-            g.mul_add(phase, by_matter[1]),
-            b.mul_add(phase, by_matter[2]),
-        ];
+        even = [r.mul_add(scattered, even[0]), g.mul_add(scattered, even[1]), b.mul_add(scattered, even[2])];
         if is_glossy {
             for lane in 0..S::WIDTH {
                 let (direction, radiance) = arriving.of(i * S::WIDTH + lane);
                 let cos = direction.dot(side);
                 let kept = kept.as_slice()[lane];
                 if cos > 0.0 && kept > 0.0 && !radiance.is_black() {
-                    glossy += event.brdf.eval(side, direction, w_out, &event.surface) * radiance * (cos * kept);
+                    glossy += brdf.eval(side, direction, w_out, &surface) * radiance * (cos * kept);
                 }
             }
-        } else if normal.is_some() {
-            let cos = (dx * side.x + dy * side.y + dz * side.z).max(zero) * kept;
-            by_surface =
-                [r.mul_add(cos, by_surface[0]), g.mul_add(cos, by_surface[1]), b.mul_add(cos, by_surface[2])];
         }
     }
-    let q = if normal.is_some() { event.q } else { 0.0 };
-    let mut sum = event.surface.albedo * total::<S>(by_matter) * (1.0 - q);
-    if is_glossy {
-        sum += glossy * q;
-    } else if q > 0.0 {
-        sum += event.surface.albedo * total::<S>(by_surface) * (q * FRAC_1_PI);
-    }
-    sum
+    let [r, g, b] = even;
+    surface.albedo * Rgb::new(sum::<S>(r), sum::<S>(g), sum::<S>(b)) + glossy * q
 }
 
-/// Sums of all lanes.
+/// The sum of all lanes, by halves.
 #[inline(always)]
-fn total<S: Lanes>([r, g, b]: [S::f32s; 3]) -> Rgb {
-    Rgb::new(sum::<S>(&r), sum::<S>(&g), sum::<S>(&b))
-}
-
-/// The sum of all lanes, four at a time.
-#[inline(always)]
-fn sum<S: Lanes>(lanes: &S::f32s) -> f32 {
-    let mut sums = [0.0; 4];
-    for four in lanes.as_slice().chunks_exact(4) {
-        for (sum, x) in sums.iter_mut().zip(four) {
-            *sum += x;
-        }
+fn sum<S: Lanes>(lanes: S::f32s) -> f32 {
+    let mut all = [0.0; MOST_LANES];
+    lanes.store_slice(&mut all[..S::WIDTH]);
+    let mut eight = [0.0; 8];
+    for i in 0..8 {
+        eight[i] = all[i] + all[i + 8];
     }
-    (sums[0] + sums[1]) + (sums[2] + sums[3])
+    let mut four = [0.0; 4];
+    for i in 0..4 {
+        four[i] = eight[i] + eight[i + 4];
+    }
+    (four[0] + four[2]) + (four[1] + four[3])
 }

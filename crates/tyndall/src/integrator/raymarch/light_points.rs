@@ -1,9 +1,8 @@
 //! Fixed points on all lights, the same for every position, and the light that arrives from them.
 
-use super::march::points_on_lights;
 use crate::integrator::shadow_grid::{Aim, Layout, padded};
 use crate::light::{Light, LightPoint, LightSample, SphereLight};
-use crate::math::{Rgb, Vec3};
+use crate::math::{Rgb, Vec3, cast};
 use crate::sampling::warp;
 use crate::scene::Scene;
 use crate::simd::Lanes;
@@ -80,7 +79,11 @@ impl LightPoints {
                 if let Light::Sphere(sphere) = light {
                     let normal = warp::sphere(u);
                     let position = sphere.middle + normal * sphere.radius;
-                    near.points.push(LightPoint { position, normal: Some(normal), intensity: sphere.radiance });
+                    near.points.push(LightPoint {
+                        position,
+                        normal: Some(normal),
+                        intensity: sphere.radiance,
+                    });
                     near.sphere = Some(*sphere);
                     points.places.push(Place::At(position));
                 } else if let Some(point) = light.point(u) {
@@ -129,12 +132,13 @@ impl LightPoints {
         if self.near.is_empty() { Arrivals::default() } else { self.distant.clone() }
     }
 
-    /// What arrives at a world position without matter; `space` is from [`Self::arrivals`].
+    /// What arrives at an index-space position without matter; `space` is from [`Self::arrivals`].
     #[inline(always)]
-    pub fn arriving<'a>(&'a self, here: Vec3, space: &'a mut Arrivals) -> &'a Arrivals {
+    pub fn arriving<'a>(&'a self, grid: &Grid, position: Vec3, space: &'a mut Arrivals) -> &'a Arrivals {
         if self.near.is_empty() {
             return &self.distant;
         }
+        let here = grid.index_to_world(position);
         for NearLight { first, points, sphere } in &self.near {
             let mut sum = 0.0;
             for (i, point) in (*first..).zip(points) {
@@ -205,5 +209,36 @@ impl Arrivals {
     pub fn of(&self, i: usize) -> (Vec3, Rgb) {
         let ([x, y, z], [r, g, b]) = (&self.direction, &self.radiance);
         (Vec3::new(x[i], y[i], z[i]), Rgb::new(r[i], g[i], b[i]))
+    }
+}
+
+/// Points in the unit square, stratified in both coordinates.
+pub(super) fn points_on_lights(count: usize) -> Vec<[f32; 2]> {
+    let count = cast::fit_u32(count);
+    (0..count).map(|i| hammersley(i, count)).collect()
+}
+
+/// The `i`-th of `n` points of the Hammersley set: stratified in the first coordinate, and in the second for powers of two.
+fn hammersley(i: u32, n: u32) -> [f32; 2] {
+    let radical_inverse = (i.reverse_bits() >> 8) as f32 / (1 << 24) as f32;
+    // Below 1: the largest of n radical inverses is 1 - 1/2^k with 2^k < 2n.
+    [(i as f32 + 0.5) / n as f32, radical_inverse + 0.5 / n as f32]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn fixed_points_are_stratified_and_inside_the_square() {
+        for n in [1, 2, 3, 5, 16, 100, 256, 4096] {
+            let mut strata = vec![0; n as usize];
+            for i in 0..n {
+                let [u, v] = hammersley(i, n);
+                assert!((0.0..1.0).contains(&u) && (0.0..1.0).contains(&v), "{u}, {v} of {n}");
+                strata[cast::index(v * n as f32)] += 1;
+            }
+            assert!(!n.is_power_of_two() || strata.iter().all(|&k| k == 1), "{n}: {strata:?}");
+        }
     }
 }

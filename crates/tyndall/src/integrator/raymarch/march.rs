@@ -2,11 +2,12 @@
 
 use super::Settings;
 use super::cached::CachedLight;
+use super::light_points::points_on_lights;
 use super::shadows::CachedShadows;
 use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::Stop;
 use crate::integrator::view_march::{Coverage, OPAQUE, Shader, composite};
-use crate::math::{Ray, Rgb, Vec3, cast};
+use crate::math::{Ray, Rgb, Vec3};
 use crate::medium::{PacketMarch, PacketSample, Track};
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes, Level, MOST_LANES};
@@ -314,19 +315,6 @@ impl Kernel for MarchOne<'_> {
     }
 }
 
-/// Points in the unit square, stratified in both coordinates.
-pub(super) fn points_on_lights(count: usize) -> Vec<[f32; 2]> {
-    let count = cast::fit_u32(count);
-    (0..count).map(|i| hammersley(i, count)).collect()
-}
-
-/// The `i`-th of `n` points of the Hammersley set: stratified in the first coordinate, and in the second for powers of two.
-fn hammersley(i: u32, n: u32) -> [f32; 2] {
-    let radical_inverse = (i.reverse_bits() >> 8) as f32 / (1 << 24) as f32;
-    // Below 1: the largest of n radical inverses is 1 - 1/2^k with 2^k < 2n.
-    [(i as f32 + 0.5) / n as f32, radical_inverse + 0.5 / n as f32]
-}
-
 /// The `i`-th point of the R2 sequence \[Roberts18\], which starts in the middle of the unit square.
 fn spread(i: u32) -> [f32; 2] {
     // Inverse powers of the plastic number, as fractions of 2^32, so that no bits are lost for large i.
@@ -339,16 +327,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fixed_points_are_stratified_and_inside_the_square() {
-        for n in [1, 2, 3, 5, 16, 100, 256, 4096] {
-            let mut strata = vec![0; n as usize];
-            for i in 0..n {
-                let [u, v] = hammersley(i, n);
-                assert!((0.0..1.0).contains(&u) && (0.0..1.0).contains(&v), "{u}, {v} of {n}");
-                strata[crate::math::cast::index(v * n as f32)] += 1;
-            }
-            assert!(!n.is_power_of_two() || strata.iter().all(|&k| k == 1), "{n}: {strata:?}");
-        }
+    fn positions_in_a_pixel_start_in_its_middle_and_average_to_it() {
         assert_eq!(spread(0), [0.5, 0.5]);
         let n = 4096;
         let mean = (0..n).map(|i| spread(i)[1]).sum::<f32>() / n as f32;

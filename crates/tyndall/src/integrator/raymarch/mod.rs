@@ -1,5 +1,5 @@
-//! Emission, absorption and single scattering by marching along the view ray, with shadow rays to
-//! every light: deterministic, but flat.
+//! Emission, absorption and single scattering by marching along the view ray: deterministic, but flat. Shadows come from a grid
+//! (`shadow_grid`), or from rays to every point on the lights.
 //!
 //! Light from glowing matter that other matter scatters is left out.
 
@@ -12,7 +12,10 @@ mod shadows;
 pub use march::RayMarch;
 pub use settings::{Settings, Shadows};
 
-use super::{Edited, Limits, MemoryNeed, Method, MethodReport, PixelCounts, Resources, StageNames, Stop, Updated, settings_of};
+use super::{
+    Edited, Limits, MemoryNeed, Method, MethodReport, PixelCounts, Resources, StageNames, Stop, Updated,
+    settings_of,
+};
 use crate::film::{Goal, Tile};
 use crate::scene::{Difference, Scene};
 use march::Packet;
@@ -20,8 +23,7 @@ use shadows::Plan;
 
 impl Method for RayMarch {
     const NAME: &'static str = "raymarch";
-    const ABOUT: &'static str =
-        "Ray marching with shadow rays: emission, absorption and single scattering; deterministic and flat.";
+    const ABOUT: &'static str = "Ray marching with cached shadows: emission, absorption and single scattering; deterministic and flat.";
     const HAS_NOISE: bool = false;
     // They only smooth edges.
     const DEFAULT_SAMPLES: u32 = 4;

@@ -47,10 +47,13 @@ impl Plan {
         }
     }
 
-    /// Most memory that its texels take.
+    /// Memory that its texels take, and while they are computed the rays.
     pub fn most_bytes(&self, scene: &Scene, settings: &Settings) -> Option<u64> {
         match self {
-            Self::Grid(layout) => Some(layout.bytes(light_points(scene, settings))),
+            Self::Grid(layout) => {
+                let points = light_points(scene, settings);
+                Some(layout.bytes(points) + layout.bytes_of_sweeps(points))
+            }
             _ => None,
         }
     }
@@ -106,6 +109,10 @@ impl RayMarch {
                 if !keeps_shadows(edit.difference) {
                     kept.grid.restart();
                 }
+            }
+            (Some(kept), Some(mut next)) => {
+                next.grid.take_memory(&mut kept.grid);
+                *kept = next;
             }
             (shadows, next) => drop_elsewhere(std::mem::replace(shadows, next)),
         }

@@ -1,8 +1,10 @@
 //! Which texels are kept: those near matter, since shadows are looked up only where matter is.
 
-use super::Lattice;
+use super::lattice::Lattice;
 use crate::math::cast;
 use crate::medium::Medium;
+use rayon::prelude::*;
+use std::ops::RangeInclusive;
 
 /// Texels along the edge of a brick, which are kept together or not at all.
 pub(super) const EDGE: usize = 8;
@@ -17,39 +19,60 @@ pub(super) struct Bricks {
     kept: Vec<[usize; 3]>,
 }
 
-/// Voxels along the edges of cells that are tested for matter.
+/// Where there may be matter: per cell of a few voxels, whether any value in it is opaque.
+#[derive(Debug)]
+pub(super) struct OpaqueCells {
+    dims: [usize; 3],
+    is_opaque: Vec<bool>,
+}
+
+/// Voxels along a cell's edges.
 const CELL: usize = 4;
 
-impl Bricks {
-    /// Keeps every brick with a texel that is a corner of a cell in which there may be matter.
-    pub fn new(lattice: &Lattice, medium: &Medium) -> Self {
+impl OpaqueCells {
+    /// In parallel on the current pool.
+    pub fn new(medium: &Medium) -> Self {
         let cells = medium.volume().cells_of(CELL);
-        let opaque: Vec<bool> =
-            cells.ranges().iter().map(|&values| medium.transfer().opacity_range(values)[1] > 0.0).collect();
+        let is_opaque = |&values: &[f32; 2]| medium.transfer().opacity_range(values)[1] > 0.0;
+        let is_opaque = cells.ranges().par_iter().with_min_len(1 << 12).map(is_opaque).collect();
+        Self { dims: cells.dims(), is_opaque }
+    }
+
+    /// The cell at an index-space coordinate along an axis; the nearest for those outside.
+    fn cell(&self, a: usize, index: f32) -> usize {
+        cast::index(index.max(0.0) / CELL as f32).min(self.dims[a] - 1)
+    }
+
+    /// Whether there may be matter in some of these cells.
+    fn any(&self, [xs, ys, zs]: [RangeInclusive<usize>; 3]) -> bool {
+        let [nx, ny, _] = self.dims;
+        zs.into_iter()
+            .any(|z| ys.clone().any(|y| self.is_opaque[nx * (y + ny * z)..][xs.clone()].contains(&true)))
+    }
+}
+
+impl Bricks {
+    /// Keeps every brick with a texel that is a corner of a cell of the lattice in which there may be matter; in parallel on the current pool.
+    pub fn new(lattice: &Lattice, opaque: &OpaqueCells) -> Self {
         let counts = lattice.texels().map(|n| n.div_ceil(EDGE));
-        // Along an axis, the cells in the space of which texels of the `b`-th brick are corners.
+        // Along an axis, the opaque cells in the space of which texels of the `b`-th brick are corners.
         let around = |a: usize, b: usize| {
-            let cell = |texel: f32| {
-                let cell = (lattice.index_at(a, texel) / CELL as f32).max(0.0);
-                cast::index(cell).min(cells.dims()[a] - 1)
-            };
+            let cell = |texel: f32| opaque.cell(a, lattice.index_at(a, texel));
             cell((b * EDGE) as f32 - 1.0)..=cell(((b + 1) * EDGE) as f32)
         };
-        let [nx, ny, _] = cells.dims();
-        let mut bricks = Self { counts, numbers: Vec::with_capacity(counts.iter().product()), kept: Vec::new() };
-        for bz in 0..counts[2] {
-            for by in 0..counts[1] {
-                for bx in 0..counts[0] {
-                    let [xs, ys, zs] = [around(0, bx), around(1, by), around(2, bz)];
-                    let has_matter = zs.into_iter().any(|z| {
-                        ys.clone().any(|y| opaque[nx * (y + ny * z)..][xs.clone()].contains(&true))
-                    });
-                    if has_matter {
-                        bricks.kept.push([bx, by, bz]);
-                    }
-                    bricks.numbers.push(if has_matter { cast::fit_u32(bricks.kept.len()) } else { 0 });
-                }
+        let at = |i: usize| [i % counts[0], i / counts[0] % counts[1], i / (counts[0] * counts[1])];
+        let has_matter = |i: usize| {
+            let [x, y, z] = at(i);
+            opaque.any([around(0, x), around(1, y), around(2, z)])
+        };
+        let keep: Vec<bool> =
+            (0..counts.iter().product()).into_par_iter().with_min_len(1 << 10).map(has_matter).collect();
+        let mut bricks = Self { counts, numbers: Vec::with_capacity(keep.len()), kept: Vec::new() };
+        for (i, keep) in keep.into_iter().enumerate() {
+            if keep {
+                bricks.kept.push(at(i));
             }
+            bricks.numbers.push(if keep { cast::fit_u32(bricks.kept.len()) } else { 0 });
         }
         bricks
     }

@@ -5,57 +5,15 @@
 //! light, so that nothing is interpolated but matter, and once the transmittance, from rays to texels.
 
 use super::bricks::EDGE;
+use super::course::{Axes, Course};
 use super::slab::{Slab, union};
-use super::{Aim, FULL, Surroundings};
-use crate::math::{Mat3, cast};
+use super::step::{Crossings, RowWay, Step};
+use super::{Aim, CLOSE, FULL, Surroundings};
+use crate::math::cast;
 use crate::simd::{Kernel, Lanes, Level, MOST_LANES, one_minus_exp};
 use fearless_simd::prelude::*;
 use rayon::prelude::*;
 use std::ops::Range;
-
-/// Axes of a sweep through planes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Axes {
-    /// In rows, along the lanes.
-    pub u: usize,
-    /// From row to row of a plane.
-    pub v: usize,
-    /// From plane to plane.
-    pub w: usize,
-}
-
-impl Axes {
-    /// By x, y and z, from those along these axes.
-    #[inline(always)]
-    pub fn coordinates(self, u: usize, v: usize, w: usize) -> [usize; 3] {
-        let mut coordinates = [0; 3];
-        (coordinates[self.u], coordinates[self.v], coordinates[self.w]) = (u, v, w);
-        coordinates
-    }
-}
-
-/// The planes that a fan passes.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Course {
-    pub axes: Axes,
-    /// Whether planes ascend: away from a light at lower coordinates.
-    pub ascending: bool,
-    /// Texels along the axes u, v and w.
-    pub texels: [usize; 3],
-}
-
-impl Course {
-    /// The `n`-th plane away from the light.
-    pub fn plane(&self, n: usize) -> usize {
-        if self.ascending { n } else { self.texels[2] - 1 - n }
-    }
-
-    /// Distance of the `n`-th plane from a coordinate, in planes; negative before it.
-    fn beyond(&self, n: usize, w: f32) -> f32 {
-        let away = self.plane(n) as f32 - w;
-        if self.ascending { away } else { -away }
-    }
-}
 
 /// Rays of near points beyond the first and the last that cross the lattice, so that every texel is between two.
 const MARGIN: i32 = 2;
@@ -64,38 +22,6 @@ const MARGIN: i32 = 2;
 const PAD: usize = EDGE + 2;
 /// Values that a row of matter is continued by at either end: as many as a vector of rays may reach past it.
 const ROW_PAD: usize = 32;
-
-/// Where rays cross a plane: at `first + apart i`, along an axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Crossings {
-    first: f32,
-    apart: f32,
-    /// 1 over `apart`.
-    inverse: f32,
-}
-
-impl Crossings {
-    #[inline(always)]
-    fn new(first: f32, apart: f32) -> Self {
-        Self { first, apart, inverse: 1.0 / apart }
-    }
-
-    #[inline(always)]
-    fn of(self, i: usize) -> f32 {
-        self.first + self.apart * i as f32
-    }
-
-    /// The rays, of so many, that cross between two coordinates, or next to that.
-    #[inline(always)]
-    fn rays_within(self, range: &Range<usize>, count: usize) -> Range<usize> {
-        if range.is_empty() {
-            return 0..0;
-        }
-        let ray = |at: f32| (at - self.first) * self.inverse;
-        let (from, to) = (ray(range.start as f32 - 1.0), ray(range.end as f32));
-        cast::index(from.floor()).min(count)..cast::index(to.ceil() + 1.0).min(count)
-    }
-}
 
 /// See the module.
 #[derive(Debug)]
@@ -146,7 +72,8 @@ impl Fan {
         if let Aim::At(p) = aim {
             let Axes { u, v, w } = course.axes;
             fan.begin = (0..nw).find(|&n| course.beyond(n, p[w]) > 0.0).unwrap_or(nw);
-            let (nearest, furthest) = (course.beyond(fan.begin.min(nw - 1), p[w]), course.beyond(nw - 1, p[w]));
+            let (nearest, furthest) =
+                (course.beyond(fan.begin.min(nw - 1), p[w]), course.beyond(nw - 1, p[w]));
             fan.near.apart = 1.0 / furthest.max(1.0);
             for (i, (a, n)) in [(u, nu), (v, nv)].into_iter().enumerate() {
                 // Slopes of rays to the texels at either end; of those above 1 other sweeps take care.
@@ -163,9 +90,12 @@ impl Fan {
         fan
     }
 
+    /// Bytes that a ray takes.
+    pub const BYTES_OF_RAY: usize = 2 * size_of::<f32>() + EDGE;
+
     /// Bytes that its rays take.
     pub fn bytes(&self) -> usize {
-        (2 * size_of::<f32>() + EDGE) * self.rays[0] * self.rays[1]
+        Self::BYTES_OF_RAY * self.rays[0] * self.rays[1]
     }
 
     /// Whether a plane lies beyond the light.
@@ -220,6 +150,18 @@ impl Fan {
         }
     }
 
+    /// How a row of rays comes to the `n`-th plane.
+    #[inline(always)]
+    fn way(&self, slab: &Slab, n: usize, row: usize) -> RowWay {
+        RowWay {
+            at_u: self.crossings(slab.first, n as f64, 0),
+            back_u: self.back(0),
+            at_v: self.crossings(slab.first, n as f64, 1).of(row),
+            back_v: self.back(1).of(row),
+            reach: self.reach(n),
+        }
+    }
+
     /// Passes a slab, in parallel on the current pool.
     pub fn pass(&mut self, slab: &Slab, around: &Surroundings, level: Level) {
         self.planes.clear();
@@ -244,8 +186,8 @@ impl Fan {
 
     /// The transmittances of a row of rays before a slab; ones beyond the grid's ends.
     fn enter(&self, slab: &Slab, j: usize, out: &mut [f32]) {
-        let [moved_u, moved_v] =
-            [0, 1].map(|i| cast::truncate(cast::single(self.moved(slab.first, i) - self.moved(slab.before, i))));
+        let [moved_u, moved_v] = [0, 1]
+            .map(|i| cast::truncate(cast::single(self.moved(slab.first, i) - self.moved(slab.before, i))));
         let [nu, nv] = self.rays;
         out.fill(1.0);
         let row = i32::try_from(j).unwrap_or(i32::MAX) - moved_v;
@@ -310,7 +252,7 @@ impl Kernel for PassRow<'_> {
                 // The way begins at the light, near which matter is taken to be as here.
                 before.clone_from(&here);
             }
-            let step = Step::new(fan, slab, around, n, j);
+            let step = Step::new(around, &fan.course, n, fan.way(slab, n, j));
             let range = union(&before.rays, &here.rays);
             for first in (range.start / S::WIDTH * S::WIDTH..range.end).step_by(S::WIDTH) {
                 let vector = first..first + S::WIDTH;
@@ -319,12 +261,14 @@ impl Kernel for PassRow<'_> {
                 let to = S::f32s::from_slice(simd, &here.extinction[vector.clone()]);
                 let zero = S::f32s::splat(simd, 0.0);
                 let is_border = (from.simd_eq(zero)) | (to.simd_eq(zero));
-                let mean = (from + to) * is_border.select(S::f32s::splat(simd, BORDER_MEAN), S::f32s::splat(simd, 0.5));
+                let mean = (from + to)
+                    * is_border.select(S::f32s::splat(simd, BORDER_MEAN), S::f32s::splat(simd, 0.5));
                 let thickness = mean * step.lengths(simd, first);
                 let left = arriving - arriving * one_minus_exp(simd, thickness);
                 let left = left.simd_lt(S::f32s::splat(simd, LEAST)).select(S::f32s::splat(simd, 0.0), left);
                 left.store_slice(&mut transmittance[vector]);
-                let numbers: S::i32s = left.mul_add(S::f32s::splat(simd, FULL), S::f32s::splat(simd, 0.5)).to_int();
+                let numbers: S::i32s =
+                    left.mul_add(S::f32s::splat(simd, FULL), S::f32s::splat(simd, 0.5)).to_int();
                 let (bytes, numbers) = (&mut bytes[first..first + S::WIDTH], numbers.as_slice());
                 for lane in 0..S::WIDTH {
                     bytes[lane] = cast::low_u8(numbers[lane]);
@@ -397,123 +341,6 @@ fn load<S: Lanes>(simd: S, row: &[f32], first: usize) -> S::f32s {
     }
 }
 
-/// The ways of a row of rays from the plane before to a plane.
-struct Step<'a> {
-    around: &'a Surroundings,
-    axes: Axes,
-    /// Where they end along u, and the differences to where they began.
-    at_u: Crossings,
-    back_u: Crossings,
-    at_v: f32,
-    back_v: f32,
-    at_w: f32,
-    back_w: f32,
-    /// Last texel along u.
-    last_u: f32,
-    /// The part of the way, from its end, that is in the box, if faces along u are left aside.
-    begin: f32,
-    end: f32,
-    /// The square of a whole way's length: a polynomial in how far it goes along u.
-    squared: [f32; 3],
-    /// The length of all ways of parallel rays that meet neither faces along u nor cuts.
-    even: Option<f32>,
-}
-
-impl<'a> Step<'a> {
-    #[inline(always)]
-    fn new(fan: &Fan, slab: &Slab, around: &'a Surroundings, n: usize, j: usize) -> Self {
-        let Course { axes, texels: [nu, nv, _], ascending } = fan.course;
-        let at_v = fan.crossings(slab.first, n as f64, 1).of(j);
-        let back_v = fan.back(1).of(j);
-        let mut step = Self {
-            around,
-            axes,
-            at_u: fan.crossings(slab.first, n as f64, 0),
-            back_u: fan.back(0),
-            at_v,
-            back_v,
-            at_w: fan.course.plane(n) as f32,
-            back_w: if ascending { -1.0 } else { 1.0 },
-            last_u: (nu - 1) as f32,
-            begin: 0.0,
-            end: fan.reach(n),
-            squared: [0.0; 3],
-            even: None,
-        };
-        let (Axes { u, v, w }, back_w) = (axes, step.back_w);
-        let of = |a: usize, b: usize| Mat3::col(&around.metric, a)[b];
-        let constant = back_v * back_v * of(v, v) + 2.0 * back_v * back_w * of(v, w) + of(w, w);
-        step.squared = [constant, 2.0 * (back_v * of(u, v) + back_w * of(u, w)), of(u, u)];
-        // Where it is below the upper and above the lower face.
-        for (room, towards) in [((nv - 1) as f32 - at_v, back_v), (at_v, -back_v)] {
-            if towards > 0.0 {
-                step.end = step.end.min(room / towards);
-            } else if towards < 0.0 {
-                step.begin = step.begin.max(room / towards);
-            } else if room < 0.0 {
-                step.end = 0.0;
-            }
-        }
-        if step.back_u.apart == 0.0 && around.cuts.is_empty() {
-            let [constant, linear, square] = step.squared;
-            let to_u = step.back_u.first;
-            let length = ((to_u * square + linear) * to_u + constant).max(0.0).sqrt();
-            step.even = Some(length * (step.end - step.begin).max(0.0));
-        }
-        step
-    }
-
-    /// World lengths inside the box and the cuts, of the rays from number `first` on.
-    #[inline(always)]
-    fn lengths<S: Lanes>(&self, simd: S, first: usize) -> S::f32s {
-        let Self { around, axes: Axes { u, v, w }, at_u, back_u, at_v, back_v, at_w, back_w, .. } = *self;
-        if let Some(even) = self.even
-            && self.is_between_faces(first, S::WIDTH)
-        {
-            return S::f32s::splat(simd, even);
-        }
-        let splat = |x: f32| S::f32s::splat(simd, x);
-        let i = S::f32s::from_fn(simd, |lane| lane as f32) + first as f32;
-        let (at_u, to_u) = (i * at_u.apart + at_u.first, i * back_u.apart + back_u.first);
-        let mut part = (splat(self.begin), splat(self.end));
-        part = cut(simd, to_u, -at_u + self.last_u, part);
-        part = cut(simd, -to_u, at_u, part);
-        for half in &around.cuts {
-            let normal = [half.normal[u], half.normal[v], half.normal[w]];
-            let towards = to_u * normal[0] + (back_v * normal[1] + back_w * normal[2]);
-            let room = at_u * -normal[0] + (half.offset - at_v * normal[1] - at_w * normal[2]);
-            part = cut(simd, towards, room, part);
-        }
-        let [constant, linear, square] = self.squared;
-        let whole = ((to_u * square + linear) * to_u + constant).max(splat(0.0)).sqrt();
-        whole * (part.1 - part.0).max(splat(0.0))
-    }
-
-    /// Whether some parallel rays do not meet the box's faces along u.
-    #[inline(always)]
-    fn is_between_faces(&self, first: usize, count: usize) -> bool {
-        let ends = [self.at_u.of(first), self.at_u.of(first + count - 1)];
-        let back = self.back_u.first;
-        ends[0].min(ends[0] + back) >= 0.0 && ends[1].max(ends[1] + back) <= self.last_u
-    }
-}
-
-/// The part of a way on which `towards t <= room`; none is left where its end is before its beginning.
-#[inline(always)]
-fn cut<S: Lanes>(
-    simd: S,
-    towards: S::f32s,
-    room: S::f32s,
-    (begin, end): (S::f32s, S::f32s),
-) -> (S::f32s, S::f32s) {
-    let zero = S::f32s::splat(simd, 0.0);
-    let at = room / towards;
-    let never = towards.simd_eq(zero) & room.simd_lt(zero);
-    let begin = towards.simd_lt(zero).select(begin.max(at), begin);
-    let end = towards.simd_gt(zero).select(end.min(at), end);
-    (begin, never.select(zero, end))
-}
-
 /// Between an entry of a table and the next.
 #[inline(always)]
 fn between<S: Lanes>(simd: S, table: &[f32], entry: S::u32s, share: S::f32s) -> S::f32s {
@@ -545,7 +372,8 @@ impl Fan {
         let [nu, _, _] = self.course.texels;
         let Axes { u, v, w } = self.course.axes;
         let Aim::At(p) = self.aim else { return 0..nu };
-        let away = self.course.beyond(n, p[w]);
+        // Rather by two sweeps than, by rounding, by none.
+        let away = self.course.beyond(n, p[w]) + CLOSE;
         if !self.has_begun(n) || (p[v] - row as f32).abs() > away {
             return 0..0;
         }

@@ -8,12 +8,14 @@
 //! not depend on how far light travels. Only bricks of texels near matter are kept (`bricks`).
 
 mod bricks;
+mod course;
 mod fan;
 mod lattice;
 mod slab;
+mod step;
 mod sweeps;
 
-use bricks::{Bricks, EDGE};
+use bricks::{Bricks, EDGE, OpaqueCells};
 use lattice::Lattice;
 
 use super::Limits;
@@ -26,6 +28,9 @@ use sweeps::{Sweeps, Texels};
 
 /// Light points of a texel are padded to a multiple of this, so that every vector level reads whole vectors.
 const PADDING: usize = MOST_LANES;
+
+/// Distance, in cells, below which rounding decides on which side of a texel a light point is.
+const CLOSE: f32 = 1e-3;
 
 /// What a byte holds for a transmittance of 1.
 const FULL: f32 = 255.0;
@@ -86,10 +91,11 @@ const COARSER: f32 = 1.1;
 impl Layout {
     /// The finest one whose texels of so many light points take at most `most_bytes`; `None` if there is none that is fine enough.
     pub fn within(medium: &Medium, points: usize, most_bytes: u64) -> Option<Self> {
+        let opaque = OpaqueCells::new(medium);
         let spacings = std::iter::successors(Some(FINEST), |voxels| Some(voxels * COARSER));
         let layouts = spacings.take_while(|&voxels| voxels <= COARSEST).map(|voxels| {
             let lattice = Lattice::new(medium.volume().grid(), voxels);
-            Self { bricks: Bricks::new(&lattice, medium), lattice }
+            Self { bricks: Bricks::new(&lattice, &opaque), lattice }
         });
         layouts.into_iter().find(|layout| layout.bytes(points) <= most_bytes)
     }
@@ -97,6 +103,11 @@ impl Layout {
     /// Bytes that its texels take.
     pub fn bytes(&self, points: usize) -> u64 {
         (self.bricks.texels() as u64).saturating_mul(padded(points) as u64)
+    }
+
+    /// About the bytes that the rays of a sweep take, and the matter that they meet.
+    pub fn bytes_of_sweeps(&self, points: usize) -> u64 {
+        sweeps::most_bytes(self.lattice.texels(), points)
     }
 
     /// Whether texels are more than a voxel apart.
@@ -147,6 +158,11 @@ impl ShadowGrid {
         self.state = State::Empty;
     }
 
+    /// Uses the memory of a grid that is no longer needed, so that there are never two.
+    pub fn take_memory(&mut self, other: &mut Self) {
+        self.texels = std::mem::take(&mut other.texels);
+    }
+
     /// Whether another grid would hold the same, but for the medium.
     pub fn is_like(&self, other: &Self) -> bool {
         self.layout == other.layout && self.aims == other.aims
@@ -170,53 +186,96 @@ impl ShadowGrid {
             if !sweeps.complete(&self.aims, medium, &around, &mut texels, level, limits) {
                 return false;
             }
+            self.light_up_near_points();
             self.state = State::Ready;
         }
         true
     }
 
-    /// The texels around an index-space position.
+    /// No ray goes to a texel that a light point is on: it is fully lit.
+    fn light_up_near_points(&mut self) {
+        let last = self.layout.lattice.texels().map(|n| (n - 1) as f32);
+        for (point, aim) in self.aims.iter().enumerate() {
+            let Aim::At(p) = *aim else { continue };
+            let texel = p.round();
+            let is_inside = (0..3).all(|a| (0.0..=last[a]).contains(&texel[a]));
+            if is_inside
+                && texel.distance(p) < CLOSE
+                && let Some(texel) = self.texel(texel.to_array().map(cast::index))
+            {
+                self.texels[texel * self.stride + point] = u8::MAX;
+            }
+        }
+    }
+
+    /// Where index-space positions are among the texels.
     #[inline(always)]
-    pub fn around(&self, position: Vec3) -> Corners<'_> {
-        let Layout { lattice, bricks } = &self.layout;
-        let position = lattice.from_index(position);
-        let texels = lattice.texels();
-        let [x, y, z] = [
-            Ends::new(position.x, texels[0]),
-            Ends::new(position.y, texels[1]),
-            Ends::new(position.z, texels[2]),
-        ];
+    pub fn places<S: Lanes>(&self, simd: S, [x, y, z]: [S::f32s; 3]) -> Places {
+        let mut places = Places { lower: [[0; MOST_LANES]; 3], weights: [[0.0; MOST_LANES]; 8] };
+        let x = self.place_along(simd, 0, x, &mut places);
+        let y = self.place_along(simd, 1, y, &mut places);
+        let z = self.place_along(simd, 2, z, &mut places);
+        for i in 0..8 {
+            let weight = x[i & 1] * y[i >> 1 & 1] * (z[i >> 2] * (1.0 / FULL));
+            weight.store_slice(&mut places.weights[i][..S::WIDTH]);
+        }
+        places
+    }
+
+    /// Finds the texels on either side along an axis, and returns their shares.
+    #[inline(always)]
+    fn place_along<S: Lanes>(&self, simd: S, a: usize, index: S::f32s, places: &mut Places) -> [S::f32s; 2] {
+        let lattice = &self.layout.lattice;
+        let last = lattice.texels()[a] - 1;
+        let at = (index + 0.5) * (1.0 / lattice.spacing()[a]);
+        let at = at.max(S::f32s::splat(simd, 0.0)).min(last as f32);
+        let lower: S::i32s = at.to_int();
+        let lower = lower.min(S::i32s::splat(simd, cast::fit_u32(last - 1).cast_signed()));
+        lower.store_slice(&mut places.lower[a][..S::WIDTH]);
+        let upper = at - lower.to_float::<S::f32s>();
+        [-upper + 1.0, upper]
+    }
+
+    /// The texels around a lane's position.
+    #[inline(always)]
+    pub fn corners(&self, places: &Places, lane: usize) -> Corners<'_> {
+        let at = |a: usize| places.lower[a][lane].cast_unsigned() as usize;
+        let lower = [at(0), at(1), at(2)];
         let mut corners = Corners { texels: [&[]; 8], weights: [0.0; 8] };
+        // Most cells lie within a brick.
+        let is_within =
+            lower[0] % EDGE < EDGE - 1 && lower[1] % EDGE < EDGE - 1 && lower[2] % EDGE < EDGE - 1;
+        let first = if is_within { self.texel(lower) } else { None };
         for i in 0..8 {
             let (ux, uy, uz) = (i & 1, i >> 1 & 1, i >> 2);
-            let [tx, ty, tz] = [x.lower + ux, y.lower + uy, z.lower + uz];
-            let within = (tx % EDGE) + EDGE * (ty % EDGE + EDGE * (tz % EDGE));
-            if let Some(brick) = bricks.first_texel([tx / EDGE, ty / EDGE, tz / EDGE]) {
-                let first = (brick + within) * self.stride;
-                corners.texels[i] = self.texels.get(first..first + self.stride).unwrap_or(&[]);
+            let texel = if is_within {
+                first.map(|first| first + ux + EDGE * (uy + EDGE * uz))
+            } else {
+                self.texel([lower[0] + ux, lower[1] + uy, lower[2] + uz])
+            };
+            if let Some(texel) = texel {
+                corners.texels[i] =
+                    self.texels.get(texel * self.stride..(texel + 1) * self.stride).unwrap_or(&[]);
             }
-            corners.weights[i] = x.shares[ux] * y.shares[uy] * (z.shares[uz] / FULL);
+            corners.weights[i] = places.weights[i][lane];
         }
         corners
     }
-}
 
-/// Along an axis, the texels on either side of a position.
-#[derive(Clone, Copy, Debug)]
-struct Ends {
-    /// The coordinate of the lower one.
-    lower: usize,
-    /// Their shares.
-    shares: [f32; 2],
-}
-
-impl Ends {
+    /// The number of a texel, if it is kept.
     #[inline(always)]
-    fn new(x: f32, texels: usize) -> Self {
-        let lower = cast::index(x).min(texels - 2);
-        let upper = (x - lower as f32).clamp(0.0, 1.0);
-        Self { lower, shares: [1.0 - upper, upper] }
+    fn texel(&self, [x, y, z]: [usize; 3]) -> Option<usize> {
+        let first = self.layout.bricks.first_texel([x / EDGE, y / EDGE, z / EDGE])?;
+        Some(first + x % EDGE + EDGE * (y % EDGE + EDGE * (z % EDGE)))
     }
+}
+
+/// Where positions are among the texels, one per lane.
+pub(super) struct Places {
+    /// The coordinates of the lowest texel around.
+    lower: [[i32; MOST_LANES]; 3],
+    /// Shares of the eight texels around, over [`FULL`].
+    weights: [[f32; MOST_LANES]; 8],
 }
 
 /// The texels at the corners of a cell.

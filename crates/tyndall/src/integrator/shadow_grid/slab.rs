@@ -2,7 +2,7 @@
 
 use super::Lattice;
 use super::bricks::{Bricks, EDGE};
-use super::fan::Course;
+use super::course::Course;
 use crate::math::cast;
 use crate::medium::Medium;
 use crate::simd::{Kernel, Lanes, Level};
@@ -136,11 +136,8 @@ impl Kernel for FillRow<'_> {
         let is_kept = |u: usize| bricks.first_texel(axes.coordinates(u, v / EDGE, layer)).is_some();
         let lane = S::f32s::from_fn(simd, |lane| lane as f32);
         let [x, y, z] = axes.coordinates(0, v, plane);
-        let middle = [
-            lattice.index_at(0, x as f32),
-            lattice.index_at(1, y as f32),
-            lattice.index_at(2, z as f32),
-        ];
+        let middle =
+            [lattice.index_at(0, x as f32), lattice.index_at(1, y as f32), lattice.index_at(2, z as f32)];
         let along = lattice.spacing()[axes.u];
         let density = medium.density();
         let splat = |x: f32| S::f32s::splat(simd, x);

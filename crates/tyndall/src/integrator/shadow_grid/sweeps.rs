@@ -1,7 +1,8 @@
 //! Sweeps through the lattice, away from light points.
 
 use super::bricks::{Bricks, EDGE};
-use super::fan::{Axes, Course, Fan};
+use super::course::{Axes, Course};
+use super::fan::Fan;
 use super::slab::Slab;
 use super::{Aim, Lattice, Surroundings};
 use crate::integrator::Limits;
@@ -29,6 +30,18 @@ struct Sweep {
 struct UnderWay {
     fans: Vec<Fan>,
     slab: Slab,
+    stage: Stage,
+}
+
+/// What comes next of a slab. Each takes milliseconds, so that a stop is not waited for.
+#[derive(Clone, Copy, Debug)]
+enum Stage {
+    /// Its matter.
+    Fill,
+    /// The fan of this number passes it.
+    Pass(usize),
+    /// Texels from the brick of this number on.
+    Write(usize),
 }
 
 /// By the axis from plane to plane. Lanes go along x where they can, since matter is stored so.
@@ -36,6 +49,15 @@ const AXES: [Axes; 3] = [Axes { u: 1, v: 2, w: 0 }, Axes { u: 0, v: 2, w: 1 }, A
 
 /// Memory of the rays of a sweep, as long as there are more than one fan.
 const MOST_BYTES: usize = 128 << 20;
+
+/// About the most bytes that a sweep takes, for so many points.
+pub(super) fn most_bytes(texels: [usize; 3], points: usize) -> u64 {
+    let mut longest = texels;
+    longest.sort_unstable();
+    let plane = longest[1] as u64 * longest[2] as u64;
+    let fans = plane.saturating_mul(Fan::BYTES_OF_RAY as u64).saturating_mul(points as u64);
+    fans.min(MOST_BYTES as u64) + plane * (EDGE as u64 + 1) * size_of::<f32>() as u64
+}
 
 impl Aim {
     /// Whether a sweep passes texels whose rays to the point cross its planes most steeply.
@@ -74,7 +96,8 @@ impl Sweeps {
             let course = Course { axes, ascending, texels: [axes.u, axes.v, axes.w].map(|a| texels[a]) };
             let new = || Sweep { course, points: Vec::new(), under_way: None };
             let (mut sweep, mut bytes) = (new(), 0);
-            for (point, aim) in aims.iter().enumerate().filter(|(_, aim)| aim.needs(axes, ascending, texels)) {
+            for (point, aim) in aims.iter().enumerate().filter(|(_, aim)| aim.needs(axes, ascending, texels))
+            {
                 let more = Fan::new(point, *aim, course).bytes();
                 if !sweep.points.is_empty() && bytes + more > MOST_BYTES {
                     sweeps.push(std::mem::replace(&mut sweep, new()));
@@ -102,19 +125,30 @@ impl Sweeps {
     ) -> bool {
         let stop = limits.stop();
         while let Some(Sweep { course, points, under_way }) = self.sweeps.last_mut() {
-            let UnderWay { fans, slab } = under_way.get_or_insert_with(|| UnderWay {
+            let UnderWay { fans, slab, stage } = under_way.get_or_insert_with(|| UnderWay {
                 fans: points.iter().map(|&point| Fan::new(point, aims[point], *course)).collect(),
                 slab: Slab::new(course),
+                stage: Stage::Fill,
             });
             loop {
                 if stop.reached_now() {
                     return false;
                 }
-                if !slab.advance(course, texels.lattice, texels.bricks, medium, level) {
-                    break;
-                }
-                fans.par_iter_mut().for_each(|fan| fan.pass(slab, around, level));
-                write(course, fans, slab, texels, level);
+                *stage = match *stage {
+                    Stage::Fill if slab.advance(course, texels.lattice, texels.bricks, medium, level) => {
+                        Stage::Pass(0)
+                    }
+                    Stage::Fill => break,
+                    Stage::Pass(fan) => {
+                        fans[fan].pass(slab, around, level);
+                        if fan + 1 < fans.len() { Stage::Pass(fan + 1) } else { Stage::Write(0) }
+                    }
+                    Stage::Write(first) => {
+                        write(course, fans, slab, texels, first, level);
+                        let next = first + WRITTEN_TOGETHER;
+                        if next < texels.bricks.kept().len() { Stage::Write(next) } else { Stage::Fill }
+                    }
+                };
             }
             self.sweeps.pop();
         }
@@ -122,11 +156,17 @@ impl Sweeps {
     }
 }
 
-/// Writes the texels of a slab.
-fn write(course: &Course, fans: &[Fan], slab: &Slab, texels: &mut Texels, level: Level) {
+/// Bricks that are looked at between two questions for a stop.
+const WRITTEN_TOGETHER: usize = 1 << 12;
+
+/// Writes the texels of a slab, in some bricks from number `first` on.
+fn write(course: &Course, fans: &[Fan], slab: &Slab, texels: &mut Texels, first: usize, level: Level) {
     let Texels { bricks, ref mut bytes, stride, .. } = *texels;
     let Axes { u, v, w } = course.axes;
-    let kept = bytes.par_chunks_exact_mut(stride * EDGE * EDGE * EDGE).zip(bricks.kept().par_iter());
+    let brick = stride * EDGE * EDGE * EDGE;
+    let kept = &bricks.kept()[first..(first + WRITTEN_TOGETHER).min(bricks.kept().len())];
+    let bytes = &mut bytes[first * brick..];
+    let kept = bytes.par_chunks_exact_mut(brick).zip(kept.par_iter());
     kept.filter(|(_, at)| at[w] == slab.layer).for_each(|(bytes, at)| {
         level.run(WriteBrick { course, fans, slab, at: [at[u], at[v]], bytes, stride });
     });
@@ -159,7 +199,8 @@ impl Kernel for WriteBrick<'_> {
                     if fans.len() > FEW {
                         let (mut kept, mut masks) = ([0; WORD], [0; WORD]);
                         for fan in fans {
-                            [kept[fan.point - first], masks[fan.point - first]] = fan.texels(slab, m, v, brick_u);
+                            [kept[fan.point - first], masks[fan.point - first]] =
+                                fan.texels(slab, m, v, brick_u);
                         }
                         write_words(out, first, apart[0], kept, masks);
                     } else {
@@ -219,7 +260,9 @@ const _: () = assert!(WORD == EDGE);
 #[inline(always)]
 fn transposed(mut rows: [u64; WORD]) -> [u64; WORD] {
     // Swaps blocks of 4 x 4 bytes, then of 2 x 2, then bytes, on either side of the diagonal.
-    for (apart, mask) in [(4, 0x0000_0000_FFFF_FFFF), (2, 0x0000_FFFF_0000_FFFF), (1, 0x00FF_00FF_00FF_00FF_u64)] {
+    for (apart, mask) in
+        [(4, 0x0000_0000_FFFF_FFFF), (2, 0x0000_FFFF_0000_FFFF), (1, 0x00FF_00FF_00FF_00FF_u64)]
+    {
         for i in 0..WORD {
             if i & apart == 0 {
                 let swapped = (rows[i] >> (8 * apart) ^ rows[i + apart]) & mask;
