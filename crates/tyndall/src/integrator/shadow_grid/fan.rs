@@ -257,6 +257,10 @@ impl Kernel for PassRow<'_> {
             for first in (range.start / S::WIDTH * S::WIDTH..range.end).step_by(S::WIDTH) {
                 let vector = first..first + S::WIDTH;
                 let arriving = S::f32s::from_slice(simd, &transmittance[vector.clone()]);
+                if !arriving.simd_gt(S::f32s::splat(simd, 0.0)).any_true() {
+                    bytes[vector].fill(0);
+                    continue;
+                }
                 let from = S::f32s::from_slice(simd, &before.extinction[vector.clone()]);
                 let to = S::f32s::from_slice(simd, &here.extinction[vector.clone()]);
                 let zero = S::f32s::splat(simd, 0.0);
@@ -381,42 +385,62 @@ impl Fan {
         from..cast::index((p[u] + away).floor() + 1.0).clamp(from, nu)
     }
 
-    /// Transmittances at a brick's row of texels in the `m`-th plane of a slab, in the bytes of a word, lowest first: those between the four
-    /// rays around each texel; and bytes of ones for the texels that the fan reaches, the others being zeros.
+    /// Transmittances at a brick's texels in the `m`-th plane of a slab, between those of the four rays around each. `brick` is where it is
+    /// along u and v.
     #[inline(always)]
-    pub fn texels(&self, slab: &Slab, m: usize, v: usize, brick: usize) -> [u64; 2] {
-        let first = brick * EDGE;
+    pub fn texels(&self, slab: &Slab, m: usize, [brick_u, brick_v]: [usize; 2]) -> PlaneOfBrick {
+        let [u, v] = [brick_u * EDGE, brick_v * EDGE];
         let [rays, rows] = self.rays;
         let row = |j: usize| self.passed.get((j * EDGE + m) * rays..).unwrap_or(&[]);
+        let mut plane = PlaneOfBrick::default();
         match self.planes.get(m) {
-            Some(Grid::Parallel { before: [u, j], share: [share_u, share_v] }) => {
-                let (a, b) = (row(j + v), row(j + v + 1));
-                let (from, next) = (u + first, u + first + EDGE);
-                let (Some(a_next), Some(b_next)) = (a.get(next), b.get(next)) else { return [0; 2] };
-                let left = mix(word(a, from), word(b, from), *share_v);
-                let last = mix(u64::from(*a_next), u64::from(*b_next), *share_v);
-                [mix(left, left >> 8 | last << 56, *share_u), u64::MAX]
+            Some(Grid::Parallel { before: [i, j], share: [share_u, share_v] }) => {
+                let (mut around, mut next) = ([0; EDGE + 1], [0; EDGE + 1]);
+                for k in 0..=EDGE {
+                    let row = row(j + v + k);
+                    around[k] = word(row, i + u);
+                    next[k] = u64::from(row.get(i + u + EDGE).copied().unwrap_or(0));
+                }
+                let left = between_rows(&around, *share_v);
+                let last = between_rows(&next, *share_v);
+                let mut right = [0; EDGE];
+                for k in 0..EDGE {
+                    right[k] = left[k] >> 8 | last[k] << 56;
+                }
+                plane = PlaneOfBrick { kept: mix(&left, &right, *share_u), reached: [u64::MAX; EDGE] };
             }
             Some(Grid::Spread([at_u, at_v])) => {
-                let lower = ((v as f32 - at_v.first) * at_v.inverse).clamp(0.0, (rows - 2) as f32);
-                let j = cast::index(lower);
-                let (a, b, share_v) = (row(j), row(j + 1), part(lower - j as f32));
-                let reached = self.reached(slab.first + m, v);
-                let (mut texels, mut mask) = (0, 0);
-                for texel in first.max(reached.start)..(first + EDGE).min(reached.end) {
-                    let along = ((texel as f32 - at_u.first) * at_u.inverse).clamp(0.0, (rays - 2) as f32);
-                    let i = cast::index(along);
-                    let left = mix(u64::from(a[i]), u64::from(b[i]), share_v);
-                    let right = mix(u64::from(a[i + 1]), u64::from(b[i + 1]), share_v);
-                    let bits = 8 * (texel - first);
-                    texels |= mix(left, right, part(along - i as f32)) << bits;
-                    mask |= 0xFF << bits;
+                for k in 0..EDGE {
+                    let lower = (((v + k) as f32 - at_v.first) * at_v.inverse).clamp(0.0, (rows - 2) as f32);
+                    let j = cast::index(lower);
+                    let (a, b, share_v) = (row(j), row(j + 1), lower - j as f32);
+                    let reached = self.reached(slab.first + m, v + k);
+                    for texel in u.max(reached.start)..(u + EDGE).min(reached.end) {
+                        let along =
+                            ((texel as f32 - at_u.first) * at_u.inverse).clamp(0.0, (rays - 2) as f32);
+                        let i = cast::index(along);
+                        let between =
+                            |i: usize| f32::from(a[i]) + (f32::from(b[i]) - f32::from(a[i])) * share_v;
+                        let (left, right) = (between(i), between(i + 1));
+                        let kept = cast::index((right - left) * (along - i as f32) + left + 0.5) as u64;
+                        plane.kept[k] |= kept << (8 * (texel - u));
+                        plane.reached[k] |= 0xFF << (8 * (texel - u));
+                    }
                 }
-                [texels, mask]
             }
-            None => [0; 2],
+            None => {}
         }
+        plane
     }
+}
+
+/// Transmittances at a brick's texels in a plane.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct PlaneOfBrick {
+    /// Row by row along v; in the bytes of a word along u, lowest first.
+    pub kept: [u64; EDGE],
+    /// Bytes of ones for the texels that the fan reaches; the others are zeros.
+    pub reached: [u64; EDGE],
 }
 
 /// How rays cross a plane, along u and v.
@@ -427,7 +451,7 @@ enum Grid {
         /// Number of the last ray before the first texel.
         before: [usize; 2],
         /// Share of the ray after it there, in parts of 256.
-        share: [u64; 2],
+        share: [u16; 2],
     },
     Spread([Crossings; 2]),
 }
@@ -450,19 +474,28 @@ fn word(row: &[u8], first: usize) -> u64 {
 }
 
 /// A share in parts of 256.
-#[inline(always)]
-fn part(share: f32) -> u64 {
-    u64::from(cast::truncate(share * 256.0 + 0.5).unsigned_abs())
+fn part(share: f32) -> u16 {
+    cast::round_u16(share * 256.0)
 }
 
-/// Between the bytes of two words, by the second's share in parts of 256; rounded.
+/// Between neighbouring rows, by the second's share in parts of 256.
 #[inline(always)]
-fn mix(a: u64, b: u64, share: u64) -> u64 {
-    // Every second byte has room for a product of 16 bits.
-    const EVERY_SECOND: u64 = 0x00FF_00FF_00FF_00FF;
-    const HALF: u64 = 0x0080_0080_0080_0080;
-    let product = |a: u64, b: u64| a * (256 - share) + b * share + HALF;
-    let lower = product(a & EVERY_SECOND, b & EVERY_SECOND) >> 8 & EVERY_SECOND;
-    let upper = product(a >> 8 & EVERY_SECOND, b >> 8 & EVERY_SECOND) & !EVERY_SECOND;
-    lower | upper
+fn between_rows(rows: &[u64; EDGE + 1], share: u16) -> [u64; EDGE] {
+    let (mut a, mut b) = ([0; EDGE], [0; EDGE]);
+    a.copy_from_slice(&rows[..EDGE]);
+    b.copy_from_slice(&rows[1..]);
+    mix(&a, &b, share)
+}
+
+/// Between the bytes of words, by the second's share in parts of 256; rounded.
+#[inline(always)]
+fn mix(a: &[u64; EDGE], b: &[u64; EDGE], share: u16) -> [u64; EDGE] {
+    let (a, b): (&[u16; 4 * EDGE], &[u16; 4 * EDGE]) = (bytemuck::cast_ref(a), bytemuck::cast_ref(b));
+    let mut mixed = [0; 4 * EDGE];
+    for i in 0..mixed.len() {
+        let lower = (a[i] & 0xFF) * (256 - share) + (b[i] & 0xFF) * share + 128;
+        let upper = (a[i] >> 8) * (256 - share) + (b[i] >> 8) * share + 128;
+        mixed[i] = lower >> 8 | upper & 0xFF00;
+    }
+    bytemuck::cast(mixed)
 }

@@ -6,6 +6,7 @@ use super::course::Course;
 use crate::math::cast;
 use crate::medium::Medium;
 use crate::simd::{Kernel, Lanes, Level};
+use crate::volume::Interpolation;
 use fearless_simd::prelude::*;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -70,7 +71,7 @@ impl Slab {
         for (row, span) in self.spans.iter_mut().enumerate() {
             *span = span_of(course, bricks, layer, row);
         }
-        let parts = parts(lattice.spacing());
+        let parts = parts(lattice.spacing(), medium.volume().interpolation());
         let rows = self.extinction[nu * nv..].par_chunks_exact_mut(nu).take(self.count * nv);
         rows.with_min_len(16).enumerate().for_each(|(i, row)| {
             let (m, v) = (i / nv, i % nv);
@@ -161,8 +162,10 @@ impl Kernel for FillRow<'_> {
 }
 
 /// Offsets, in voxels, of the samples of which the extinction at a texel is the mean: about one for each voxel of the cell around it.
-fn parts(spacing: [f32; 3]) -> Vec<[f32; 3]> {
-    let counts = spacing.map(|voxels| cast::index(voxels.round()).clamp(1, 3));
+/// Where values jump from voxel to voxel, at least two along each axis, one on either side of a jump at the texel.
+fn parts(spacing: [f32; 3], interpolation: Interpolation) -> Vec<[f32; 3]> {
+    let least = if interpolation == Interpolation::Nearest { 2 } else { 1 };
+    let counts = spacing.map(|voxels| cast::index(voxels.round()).clamp(least, 3));
     let along = |a: usize, i: usize| ((i as f32 + 0.5) / counts[a] as f32 - 0.5) * spacing[a];
     let mut parts = Vec::new();
     for z in 0..counts[2] {

@@ -2,7 +2,7 @@
 
 use super::bricks::{Bricks, EDGE};
 use super::course::{Axes, Course};
-use super::fan::Fan;
+use super::fan::{Fan, PlaneOfBrick};
 use super::slab::Slab;
 use super::{Aim, Lattice, Surroundings};
 use crate::integrator::Limits;
@@ -193,20 +193,23 @@ impl Kernel for WriteBrick<'_> {
         for fans in fans.chunk_by(|a, b| a.point / WORD == b.point / WORD) {
             let first = fans[0].point / WORD * WORD;
             for m in 0..slab.count {
-                let plane = course.plane(slab.first + m) % EDGE;
-                for v in brick_v * EDGE..((brick_v + 1) * EDGE).min(nv) {
-                    let out = &mut bytes[v % EDGE * apart[1] + plane * apart[2]..];
+                let mut planes = [PlaneOfBrick::default(); WORD];
+                for fan in fans {
+                    planes[fan.point - first] = fan.texels(slab, m, [brick_u, brick_v]);
+                }
+                let layer = course.plane(slab.first + m) % EDGE;
+                for v in 0..EDGE.min(nv - brick_v * EDGE) {
+                    let out = &mut bytes[v * apart[1] + layer * apart[2]..];
                     if fans.len() > FEW {
                         let (mut kept, mut masks) = ([0; WORD], [0; WORD]);
-                        for fan in fans {
-                            [kept[fan.point - first], masks[fan.point - first]] =
-                                fan.texels(slab, m, v, brick_u);
+                        for i in 0..WORD {
+                            (kept[i], masks[i]) = (planes[i].kept[v], planes[i].reached[v]);
                         }
                         write_words(out, first, apart[0], kept, masks);
                     } else {
                         for fan in fans {
-                            let [kept, mask] = fan.texels(slab, m, v, brick_u);
-                            write_bytes(out, fan.point, apart[0], kept, mask);
+                            let PlaneOfBrick { kept, reached } = &planes[fan.point - first];
+                            write_bytes(out, fan.point, apart[0], kept[v], reached[v]);
                         }
                     }
                 }
