@@ -52,6 +52,11 @@ impl OpaqueCells {
 }
 
 impl Bricks {
+    /// How many there are in a lattice, kept or not.
+    pub fn number(lattice: &Lattice) -> usize {
+        lattice.texels().iter().map(|n| n.div_ceil(EDGE)).fold(1, usize::saturating_mul)
+    }
+
     /// Keeps every brick with a texel that is a corner of a cell of the lattice in which there may be matter; in parallel on the current pool.
     pub fn new(lattice: &Lattice, opaque: &OpaqueCells) -> Self {
         let counts = lattice.texels().map(|n| n.div_ceil(EDGE));

@@ -1,6 +1,6 @@
 //! Where texels are.
 
-use crate::math::{Mat3, Vec3, cast};
+use crate::math::{Binade, Mat3, Vec3, cast};
 use crate::volume::Grid;
 
 /// Points between the faces of the medium's box, equally far apart along each axis.
@@ -42,11 +42,17 @@ impl Lattice {
         number * self.spacing[a] - 0.5
     }
 
-    /// The world vectors of the lattice's units.
+    /// The unit of lengths in which squares of those between texels are far from the ends of single precision, in world units.
+    pub fn length_unit(grid: &Grid) -> f32 {
+        Binade::of(grid.voxel_size()).size()
+    }
+
+    /// The vectors of the lattice's units, in lengths of [`Self::length_unit`].
     pub fn units(&self, grid: &Grid) -> Mat3 {
         let origin = grid.index_to_world(Vec3::ZERO);
+        let inverse = Binade::of(grid.voxel_size()).inverse();
         let [x, y, z] = self.spacing;
-        let unit = |axis: Vec3| grid.index_to_world(axis) - origin;
+        let unit = |axis: Vec3| (grid.index_to_world(axis) - origin) * inverse;
         Mat3::from_cols(unit(Vec3::X * x), unit(Vec3::Y * y), unit(Vec3::Z * z))
     }
 }

@@ -52,7 +52,7 @@ pub(super) enum Aim {
 /// Where texels are, and what lies between them.
 #[derive(Debug)]
 struct Surroundings {
-    /// Products of the world vectors of the lattice's units: squared lengths follow.
+    /// Products of the vectors of the lattice's units, in lengths of [`Lattice::length_unit`]: squared lengths follow.
     metric: Mat3,
     /// What is cut away, in units of the lattice.
     cuts: Vec<HalfSpace>,
@@ -87,17 +87,21 @@ const FINEST: f32 = 0.5;
 const COARSEST: f32 = 8.0;
 /// By how much the next coarser spacing is wider.
 const COARSER: f32 = 1.1;
+/// Most bricks of a lattice, kept or not: four bytes are spent on each.
+const MOST_BRICKS: usize = 1 << 24;
 
 impl Layout {
     /// The finest one whose texels of so many light points take at most `most_bytes`; `None` if there is none that is fine enough.
     pub fn within(medium: &Medium, points: usize, most_bytes: u64) -> Option<Self> {
         let opaque = OpaqueCells::new(medium);
         let spacings = std::iter::successors(Some(FINEST), |voxels| Some(voxels * COARSER));
-        let layouts = spacings.take_while(|&voxels| voxels <= COARSEST).map(|voxels| {
-            let lattice = Lattice::new(medium.volume().grid(), voxels);
-            Self { bricks: Bricks::new(&lattice, &opaque), lattice }
-        });
-        layouts.into_iter().find(|layout| layout.bytes(points) <= most_bytes)
+        let lattices = spacings
+            .take_while(|&voxels| voxels <= COARSEST)
+            .map(|voxels| Lattice::new(medium.volume().grid(), voxels))
+            .filter(|lattice| Bricks::number(lattice) <= MOST_BRICKS);
+        lattices
+            .map(|lattice| Self { bricks: Bricks::new(&lattice, &opaque), lattice })
+            .find(|layout| layout.bytes(points) <= most_bytes)
     }
 
     /// Bytes that its texels take.

@@ -24,7 +24,7 @@ pub(super) struct Slab {
     pub layer: usize,
     /// Texels along u and v.
     texels: [usize; 2],
-    /// Extinction per world unit, u fastest; the plane before the first comes first.
+    /// Extinction per [`Lattice::length_unit`], u fastest; the plane before the first comes first.
     extinction: Vec<f32>,
     /// Per row of bricks, the texels along u from the first to the last brick that is kept.
     spans: Vec<Range<usize>>,
@@ -140,7 +140,7 @@ impl Kernel for FillRow<'_> {
         let middle =
             [lattice.index_at(0, x as f32), lattice.index_at(1, y as f32), lattice.index_at(2, z as f32)];
         let along = lattice.spacing()[axes.u];
-        let density = medium.density();
+        let density = medium.density() * Lattice::length_unit(medium.volume().grid());
         let splat = |x: f32| S::f32s::splat(simd, x);
         for (first, out) in (0..).step_by(S::WIDTH).zip(row.chunks_mut(S::WIDTH)) {
             if !(first / EDGE..(first + out.len()).div_ceil(EDGE)).any(is_kept) {

@@ -112,7 +112,7 @@ impl<'a> Step<'a> {
         step
     }
 
-    /// World lengths inside the box and the cuts, of the rays from number `first` on.
+    /// Lengths inside the box and the cuts, in lengths of [`Lattice::length_unit`](super::lattice::Lattice::length_unit), of the rays from number `first` on.
     #[inline(always)]
     pub fn lengths<S: Lanes>(&self, simd: S, first: usize) -> S::f32s {
         let Self { around, axes: Axes { u, v, w }, way, at_w, back_w, .. } = *self;
