@@ -22,6 +22,8 @@ const MARGIN: i32 = 2;
 const PAD: usize = EDGE + 2;
 /// Values that a row of matter is continued by at either end: as many as a vector of rays may reach past it.
 const ROW_PAD: usize = 32;
+/// Values on either side of a span of matter that rays next to it may read.
+const BESIDE: usize = 4;
 
 /// See the module.
 #[derive(Debug)]
@@ -174,8 +176,9 @@ impl Fan {
         passed.resize(rays * rows * EDGE, 0);
         let fan = &*self;
         let row = next.par_chunks_exact_mut(rays).zip(passed.par_chunks_exact_mut(rays * EDGE));
-        row.with_min_len(8).enumerate().for_each(|(j, (kept, passed))| {
-            level.run(PassRow { fan, slab, around, j, kept, passed });
+        let space = || Space::new(fan.course.texels[0], rays);
+        row.with_min_len(16).enumerate().for_each_init(space, |space, (j, (kept, passed))| {
+            level.run(PassRow { fan, slab, around, j, space, kept, passed });
         });
         self.next = std::mem::replace(&mut self.state, next);
         self.passed = passed;
@@ -205,7 +208,7 @@ impl Fan {
 const LEAST: f32 = 0.5 / FULL;
 
 /// Mean extinction, over that at the end, of a way on which matter begins or ends: for a ramp that begins anywhere on it, a third; for an
-/// edge, a half. Scans have both; this keeps the light of all three in docs/speed.md within 1 %.
+/// edge, a half. Scans have both; this keeps the light of the three in docs/shadows.md within 1 %.
 const BORDER_MEAN: f32 = 0.46;
 
 struct PassRow<'a> {
@@ -214,10 +217,26 @@ struct PassRow<'a> {
     around: &'a Surroundings,
     /// The row's number.
     j: usize,
+    space: &'a mut Space,
     /// Transmittances of the rays.
     kept: &'a mut [f32],
     /// See [`Fan::passed`].
     passed: &'a mut [u8],
+}
+
+/// What is computed for a row of rays and needed no longer.
+struct Space {
+    /// Extinction at the texels of a row.
+    row: Vec<f32>,
+    before: Met,
+    here: Met,
+}
+
+impl Space {
+    fn new(texels: usize, rays: usize) -> Self {
+        let met = || Met { rays: 0..0, extinction: vec![0.0; rays] };
+        Self { row: vec![0.0; texels + 2 * ROW_PAD], before: met(), here: met() }
+    }
 }
 
 /// What a row of rays meets at a plane.
@@ -229,28 +248,35 @@ struct Met {
     extinction: Vec<f32>,
 }
 
+impl Met {
+    fn clear(&mut self) {
+        self.extinction[self.rays.clone()].fill(0.0);
+        self.rays = 0..0;
+    }
+}
+
 impl Kernel for PassRow<'_> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { fan, slab, around, j, kept, passed } = self;
+        let Self { fan, slab, around, j, space: Space { row, before, here }, kept: transmittance, passed } =
+            self;
         let [rays, _] = fan.rays;
-        let mut row = vec![0.0; fan.course.texels[0] + 2 * ROW_PAD];
-        let mut transmittance = vec![0.0; rays];
-        fan.enter(slab, j, &mut transmittance);
-        let met = || Met { rays: 0..0, extinction: vec![0.0; rays] };
-        let (mut before, mut here) = (met(), met());
-        fan.meet(simd, slab, 0, j, &mut row, &mut before);
+        fan.enter(slab, j, transmittance);
+        before.clear();
+        if slab.first > 0 && fan.has_begun(slab.first - 1) {
+            fan.meet(simd, slab, 0, j, row, before);
+        }
         for (m, bytes) in passed.chunks_exact_mut(rays).take(slab.count).enumerate() {
             let n = slab.first + m;
             if !fan.has_begun(n) {
                 continue;
             }
-            fan.meet(simd, slab, m + 1, j, &mut row, &mut here);
+            fan.meet(simd, slab, m + 1, j, row, here);
             if n == fan.begin {
                 // The way begins at the light, near which matter is taken to be as here.
-                before.clone_from(&here);
+                before.clone_from(here);
             }
             let step = Step::new(around, &fan.course, n, fan.way(slab, n, j));
             let range = union(&before.rays, &here.rays);
@@ -278,9 +304,8 @@ impl Kernel for PassRow<'_> {
                     bytes[lane] = cast::low_u8(numbers[lane]);
                 }
             }
-            std::mem::swap(&mut before, &mut here);
+            std::mem::swap(before, here);
         }
-        kept.copy_from_slice(&transmittance);
     }
 }
 
@@ -288,7 +313,7 @@ impl Fan {
     /// The extinction where a row of rays crosses the `m`-th plane of a slab, of which the first is the one before. `row` is space.
     #[inline(always)]
     fn meet<S: Lanes>(&self, simd: S, slab: &Slab, m: usize, j: usize, row: &mut [f32], met: &mut Met) {
-        met.extinction[met.rays.clone()].fill(0.0);
+        met.clear();
         let [nu, nv, _] = self.course.texels;
         let [rays, _] = self.rays;
         let n = (slab.first + m) as f64 - 1.0;
@@ -301,7 +326,6 @@ impl Fan {
         if met.rays.is_empty() {
             return;
         }
-        row.fill(0.0);
         mix_rows(
             simd,
             [&slab.row(m, rows[0])[span.clone()], &slab.row(m, rows[1])[span.clone()]],
@@ -309,9 +333,11 @@ impl Fan {
             &mut row[ROW_PAD + span.start..ROW_PAD + span.end],
         );
         // Beyond the faces of the box, where only a part of a way counts, matter is as at the face.
-        let faces = [row[ROW_PAD], row[ROW_PAD + nu - 1]];
-        row[..ROW_PAD].fill(faces[0]);
-        row[ROW_PAD + nu..].fill(faces[1]);
+        let (from, to) = (ROW_PAD + span.start, ROW_PAD + span.end);
+        let before = if span.start == 0 { row[from] } else { 0.0 };
+        let after = if span.end == nu { row[to - 1] } else { 0.0 };
+        row[from - BESIDE..from].fill(before);
+        row[to..to + BESIDE].fill(after);
         let lane = S::f32s::from_fn(simd, |lane| lane as f32);
         let start = crossings.first + ROW_PAD as f32;
         for first in (met.rays.start / S::WIDTH * S::WIDTH..met.rays.end).step_by(S::WIDTH) {

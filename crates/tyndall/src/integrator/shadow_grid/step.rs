@@ -35,7 +35,8 @@ impl Crossings {
         }
         let ray = |at: f32| (at - self.first) * self.inverse;
         let (from, to) = (ray(range.start as f32 - 1.0), ray(range.end as f32));
-        cast::index(from.floor()).min(count)..cast::index(to.ceil() + 1.0).min(count)
+        let first = cast::index(from.floor()).min(count);
+        first..cast::index(to.ceil() + 1.0).clamp(first, count)
     }
 }
 
