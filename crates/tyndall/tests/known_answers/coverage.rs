@@ -42,7 +42,7 @@ fn alpha_depth_and_background_have_closed_forms() {
         // Steps are in units of the cube root of the voxel's volume, which is large for this wide slab.
         let march = RayMarch::of_scene(
             &scene,
-            &Settings { step: 1e-3 / 1e5_f32.powf(2.0 / 3.0), light_samples: 1 },
+            &Settings { step: 1e-3 / 1e5_f32.powf(2.0 / 3.0), light_samples: 1, ..Settings::default() },
             Level::best(),
         )
         .march(&scene, &ray);
@@ -76,7 +76,7 @@ fn a_pixel_is_covered_as_far_as_matter_fills_it() {
         session.image().rgba[0][3]
     };
     let walked = covered(PathTracer::usual());
-    let marched = covered(RayMarch::choose(Settings { step: 0.5, light_samples: 1 }));
+    let marched = covered(RayMarch::choose(Settings { step: 0.5, light_samples: 1, ..Settings::default() }));
     for share in [walked, marched] {
         assert!((share - 0.75).abs() < 2e-3, "{share} of the pixel is covered");
     }

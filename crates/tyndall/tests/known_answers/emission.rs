@@ -26,7 +26,11 @@ fn a_glowing_block_shows_its_radiance_times_its_opacity() {
     let ray = Ray::new(Vec3::new(0.1, 0.2, 5.0), -Vec3::Z);
     let expected = 3.0 * (1.0 - (-0.8_f64).exp());
     radiance(&scene, 2_000_000, |_| ray).against(expected).assert_within(3.0, 1e-3);
-    let march = RayMarch::of_scene(&scene, &Settings { step: 0.1, light_samples: 1 }, Level::best());
+    let march = RayMarch::of_scene(
+        &scene,
+        &Settings { step: 0.1, light_samples: 1, ..Settings::default() },
+        Level::best(),
+    );
     assert!((f64::from(march.march(&scene, &ray).radiance.g) / expected - 1.0).abs() < 1e-4);
 }
 

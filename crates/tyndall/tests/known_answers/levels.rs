@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use tyndall::camera::{Camera, Lens};
 use tyndall::film::Image;
 use tyndall::integrator::path::PathTracer;
-use tyndall::integrator::raymarch::{RayMarch, Settings};
+use tyndall::integrator::raymarch::{RayMarch, Settings, Shadows};
 use tyndall::integrator::{METHODS, Method, MethodEntry};
 use tyndall::light::{Directional, Environment, Light, PointLight};
 use tyndall::math::{Ray, Rgb, Vec3};
@@ -16,7 +16,7 @@ use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
 use tyndall::transfer::{Optics, Point};
 
-const MARCH: Settings = Settings { step: 0.5, light_samples: 3 };
+const MARCH: Settings = Settings { step: 0.5, light_samples: 3, shadows: Shadows::Exact };
 
 /// Glowing, reflecting and purely scattering matter with empty space between, in blocks of 9 x 7 x 11 voxels.
 fn scene(majorant_cell: usize) -> Scene {
@@ -60,11 +60,14 @@ fn farthest(a: &Image, b: &Image) -> f32 {
 
 #[test]
 fn every_level_marches_to_the_same_picture() {
-    let scalar = picture(scene(8), RayMarch::choose(MARCH), Level::available()[0], 2);
-    assert!(scalar.rgba.iter().any(|p| p[3] > 0.6) && scalar.rgba.iter().any(|p| p[3] < 0.5));
-    for level in Level::available() {
-        let apart = farthest(&scalar, &picture(scene(8), RayMarch::choose(MARCH), level, 2));
-        assert!(apart < 1e-3, "{apart} apart with {level:?}");
+    for shadows in [Shadows::Exact, Shadows::Cached] {
+        let march = || RayMarch::choose(Settings { shadows, ..MARCH });
+        let scalar = picture(scene(8), march(), Level::available()[0], 2);
+        assert!(scalar.rgba.iter().any(|p| p[3] > 0.6) && scalar.rgba.iter().any(|p| p[3] < 0.5));
+        for level in Level::available() {
+            let apart = farthest(&scalar, &picture(scene(8), march(), level, 2));
+            assert!(apart < 1e-3, "{apart} apart with {level:?} and {shadows:?} shadows");
+        }
     }
 }
 
@@ -145,7 +148,7 @@ fn a_deadline_stops_promptly() {
     let inside = PointLight { position: Vec3::new(0.1, 0.2, 0.3), intensity: Rgb::WHITE };
     setup.lights = vec![Light::Point(inside)];
     let whole = setup.scene();
-    let march = RayMarch::choose(Settings { step: 0.001, light_samples: 1000 });
+    let march = RayMarch::choose(Settings { step: 0.001, light_samples: 1000, shadows: Shadows::Exact });
     for method in METHODS.iter().map(MethodEntry::default_settings).chain([march]) {
         let mut scene = whole.clone();
         scene.size = [256, 256];

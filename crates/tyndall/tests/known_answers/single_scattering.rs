@@ -2,10 +2,14 @@
 
 use crate::scenes::{Setup, henyey_greenstein, matter, radiance, slab, volume};
 use std::f64::consts::PI;
-use tyndall::integrator::raymarch::{RayMarch, Settings};
+use std::sync::Arc;
+use tyndall::camera::{Camera, Lens};
+use tyndall::integrator::Method;
+use tyndall::integrator::raymarch::{RayMarch, Settings, Shadows};
 use tyndall::light::{Directional, Disk, Environment, Light, PointLight, Rect, SphereLight};
 use tyndall::math::{Ray, Rgb, Vec3};
 use tyndall::scene::Scene;
+use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
 
 struct Case {
@@ -66,7 +70,7 @@ fn raymarch_and_the_order_of_its_step_error() {
         let error = |steps: f64| {
             let march = RayMarch::of_scene(
                 &scene,
-                &Settings { step: (1.0 / (steps * voxel)) as f32, light_samples: 1 },
+                &Settings { step: (1.0 / (steps * voxel)) as f32, light_samples: 1, ..Settings::default() },
                 Level::best(),
             );
             f64::from(march.march(&scene, &case.ray()).radiance.g) / case.expected() - 1.0
@@ -75,6 +79,38 @@ fn raymarch_and_the_order_of_its_step_error() {
         // 8 times finer steps: about 64 times less error, plus single-precision rounding.
         assert!(fine.abs() < coarse.abs() / 30.0 + 2e-5, "error {coarse:e} at 1/32, {fine:e} at 1/256");
         assert!(coarse.abs() < 0.02 && coarse.abs() > 1e-6, "error {coarse:e} at 1/32");
+    }
+}
+
+/// What arrives along a ray with cached shadows, which only pictures have.
+fn with_cached_shadows(scene: &Scene, ray: &Ray, step: f32, light_samples: u32) -> f64 {
+    let mut scene = scene.clone();
+    let lens = Lens::Orthographic { height: 1e-4 };
+    scene.camera = Camera::new(ray.origin, ray.at(1.0), Vec3::new(0.6, 0.8, 0.0), lens);
+    scene.render.method = RayMarch::choose(Settings { step, light_samples, shadows: Shadows::Cached });
+    let threads = Arc::new(rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap());
+    let mut session = Session::new(scene, threads);
+    session.refine(&Budget::samples(1));
+    f64::from(session.image().rgba[0][1])
+}
+
+/// Transmittance is linear between texels, half a voxel apart.
+#[test]
+fn cached_shadows_in_a_slab() {
+    const LAYERS: usize = 48;
+    for case in &CASES {
+        let mut scene = case.scene();
+        let wide = 1e5;
+        let layers = volume([1, 1, LAYERS], [wide, wide, 1.0], |_| 0.0);
+        let phase = henyey_greenstein(case.g);
+        let mut setup = Setup { phase, ..Setup::new(layers, matter(case.albedo), case.thickness) };
+        setup.lights = scene.lights.lights().to_vec();
+        setup.max_scatter = 1;
+        scene = setup.scene();
+        let voxel = (wide * wide / LAYERS as f64).cbrt();
+        let step = (1.0 / (LAYERS as f64 * 4.0 * voxel)) as f32;
+        let off = with_cached_shadows(&scene, &case.ray(), step, 1) / case.expected() - 1.0;
+        assert!(off.abs() < 5e-3, "{off:e} off at a thickness of {}", case.thickness);
     }
 }
 
@@ -99,10 +135,20 @@ fn both_methods_agree_under_every_light() {
         let scene = setup.scene();
         let ray = Ray::new(Vec3::new(-0.4, -0.2, 3.0), -Vec3::Z);
         let marched = f64::from(
-            RayMarch::of_scene(&scene, &Settings { step: 0.25, light_samples: 512 }, Level::best())
-                .march(&scene, &ray)
-                .radiance
-                .g,
+            RayMarch::of_scene(
+                &scene,
+                &Settings { step: 0.25, light_samples: 512, shadows: Shadows::Exact },
+                Level::best(),
+            )
+            .march(&scene, &ray)
+            .radiance
+            .g,
+        );
+        // One ray sees few texels, and they hold bytes: here of 1/20 to 1/4.
+        let cached = with_cached_shadows(&scene, &ray, 0.25, 64);
+        assert!(
+            (cached / marched - 1.0).abs() < 0.02,
+            "{name}: {cached} with cached shadows, {marched} without"
         );
         let walked = radiance(&scene, 1_000_000, |_| ray);
         let error = walked.variance_of_mean().sqrt();

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tyndall::film::Image;
 use tyndall::integrator::photon::{PhotonMapper, Settings as PhotonSettings};
-use tyndall::integrator::raymarch::{RayMarch, Settings};
+use tyndall::integrator::raymarch::{RayMarch, Settings, Shadows};
 use tyndall::integrator::{METHODS, Method, method_of};
 use tyndall::light::{Directional, Environment, Light};
 use tyndall::math::{Rgb, Vec3};
@@ -47,7 +47,7 @@ fn picture(scene: &Scene, threads: usize, slice: Option<Duration>) -> Image {
 
 #[test]
 fn threads_and_slices_leave_no_trace() {
-    let march = |step| RayMarch::choose(Settings { step, light_samples: 4 });
+    let march = |step| RayMarch::choose(Settings { step, light_samples: 4, shadows: Shadows::Exact });
     // Without scattering a march is interrupted only between its steps, of which the small step gives many.
     let photons = PhotonMapper::choose(PhotonSettings { photons: 20_000, segments: 5, ..PHOTONS });
     let all = METHODS.iter().map(|method| (method.draft(&method.default_settings()), 8));
