@@ -43,11 +43,18 @@ impl Data {
 
     /// An NRRD file of the samples in a type of that name there.
     pub fn nrrd(&self, kind: &str) -> Vec<u8> {
-        let Self { dims: [nx, ny, nz], spacing: s, origin: [ox, oy, oz], .. } = self;
+        let s = self.spacing;
+        self.nrrd_along(kind, [[s, 0.0, 0.0], [0.0, s, 0.0], [0.0, 0.0, s]])
+    }
+
+    /// The same, with vectors from voxel to voxel along each axis.
+    pub fn nrrd_along(&self, kind: &str, axes: [[f64; 3]; 3]) -> Vec<u8> {
+        let Self { dims: [nx, ny, nz], origin: [ox, oy, oz], .. } = self;
+        let [a, b, c] = axes.map(|[x, y, z]| format!("({x:e},{y:e},{z:e})"));
         let space = if self.anatomical { "space: LPS" } else { "space dimension: 3" };
         let head = format!(
             "NRRD0004\ntype: {kind}\ndimension: 3\nsizes: {nx} {ny} {nz}\n{space}\n\
-             space directions: ({s:e},0,0) (0,{s:e},0) (0,0,{s:e})\nspace origin: ({ox:e},{oy:e},{oz:e})\n\
+             space directions: {a} {b} {c}\nspace origin: ({ox:e},{oy:e},{oz:e})\n\
              encoding: raw\nendian: little\n\n"
         );
         [head.as_bytes(), &self.bytes(kind)].concat()
@@ -124,7 +131,8 @@ pub fn apart(a: &Image, b: &Image) -> f64 {
     ours.iter().zip(&theirs).map(|(a, b)| (a - b).abs() / brightest).fold(0.0, f64::max)
 }
 
-fn blocks(image: &Image) -> Vec<f64> {
+/// The light of blocks of 8 x 8 pixels.
+pub fn blocks(image: &Image) -> Vec<f64> {
     const EDGE: usize = 8;
     let [width, height] = image.size.map(|n| n as usize);
     let sum = |x0: usize, y0: usize| -> f64 {

@@ -9,7 +9,7 @@ use tyndall_formats::image::{Metadata, Picture, write};
 const WIDTH: usize = 16;
 
 /// A map that is black but for two columns and two rows around a place, given in parts of its width and height.
-fn put_map(folder: &Folder, [x, y]: [f64; 2]) {
+pub fn put_map(folder: &Folder, [x, y]: [f64; 2]) {
     let height = WIDTH / 2;
     let near = |texel: usize, count: usize, place: f64| {
         let apart = ((texel as f64 + 0.5) / count as f64 - place).abs();

@@ -4,6 +4,7 @@
 mod backgrounds;
 mod bad_input;
 mod broken_files;
+mod cached_shadows;
 mod data;
 mod environment_maps;
 mod far_origin;
