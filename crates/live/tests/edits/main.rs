@@ -3,6 +3,7 @@
 mod live;
 mod photons;
 mod samples;
+mod shadows;
 mod stops;
 
 use serde_json::{Value, json};
