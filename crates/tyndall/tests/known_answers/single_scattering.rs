@@ -94,7 +94,7 @@ fn with_cached_shadows(scene: &Scene, ray: &Ray, step: f32, light_samples: u32) 
     f64::from(session.image().rgba[0][1])
 }
 
-/// Transmittance is linear between texels, half a voxel apart.
+/// Transmittance is linear between texels, a quarter of a voxel apart.
 #[test]
 fn cached_shadows_in_a_slab() {
     const LAYERS: usize = 48;

@@ -81,12 +81,16 @@ pub(super) struct Layout {
     bricks: Bricks,
 }
 
-/// Finest spacing of texels, in voxels.
-const FINEST: f32 = 0.5;
+/// Spacing of texels, in voxels, that suffices where matter is no steeper than in scans.
+const USUAL: f32 = 0.5;
+/// Finest spacing, where there is memory for it: small volumes often have hard edges.
+const FINEST: f32 = 0.25;
 /// Coarsest spacing.
 const COARSEST: f32 = 8.0;
-/// By how much the next coarser spacing is wider.
-const COARSER: f32 = 1.1;
+/// By how much spacings grow until texels fit.
+const COARSER: f32 = 1.02;
+/// About the bytes of texels that are finer than usual: they take a fraction of a second to compute.
+const BYTES_OF_FINER: u64 = 128 << 20;
 /// Most bricks of a lattice, kept or not: four bytes are spent on each.
 const MOST_BRICKS: usize = 1 << 24;
 
@@ -94,14 +98,25 @@ impl Layout {
     /// The finest one whose texels of so many light points take at most `most_bytes`; `None` if there is none that is fine enough.
     pub fn within(medium: &Medium, points: usize, most_bytes: u64) -> Option<Self> {
         let opaque = OpaqueCells::new(medium);
-        let spacings = std::iter::successors(Some(FINEST), |voxels| Some(voxels * COARSER));
-        let lattices = spacings
-            .take_while(|&voxels| voxels <= COARSEST)
-            .map(|voxels| Lattice::new(medium.volume().grid(), voxels))
-            .filter(|lattice| Bricks::number(lattice) <= MOST_BRICKS);
-        lattices
-            .map(|lattice| Self { bricks: Bricks::new(&lattice, &opaque), lattice })
-            .find(|layout| layout.bytes(points) <= most_bytes)
+        let lattice = |voxels: f32| Lattice::new(medium.volume().grid(), voxels);
+        let layout = |voxels: f32| {
+            let lattice = lattice(voxels);
+            Self { bricks: Bricks::new(&lattice, &opaque), lattice }
+        };
+        let mut voxels = USUAL;
+        while Bricks::number(&lattice(voxels)) > MOST_BRICKS {
+            voxels *= COARSER;
+        }
+        let usual = layout(voxels);
+        // By how much wider the same bytes would be filled, if matter filled the same share of them.
+        let wider = |bytes: u64| cast::single((usual.bytes(points) as f64 / bytes as f64).cbrt());
+        if voxels == USUAL && usual.bytes(points) <= BYTES_OF_FINER.min(most_bytes) {
+            return Some(layout((USUAL * wider(BYTES_OF_FINER)).max(FINEST)));
+        }
+        voxels *= wider(most_bytes).max(1.0);
+        let spacings = std::iter::successors(Some(voxels), |voxels| Some(voxels * COARSER));
+        let mut layouts = spacings.take_while(|&voxels| voxels <= COARSEST).map(layout);
+        layouts.find(|layout| layout.bytes(points) <= most_bytes)
     }
 
     /// Bytes that its texels take.
