@@ -33,7 +33,7 @@ impl Lattice {
 
     /// A position of index space in units of the lattice, in which texels have whole coordinates.
     #[inline(always)]
-    pub fn from_index(&self, position: Vec3) -> Vec3 {
+    pub fn index_to_lattice(&self, position: Vec3) -> Vec3 {
         (position + 0.5) / Vec3::from_array(self.spacing)
     }
 

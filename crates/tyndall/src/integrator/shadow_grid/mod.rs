@@ -136,7 +136,7 @@ impl Layout {
 
     /// Where a light is in units of the lattice.
     pub fn aim_at(&self, grid: &Grid, position: Vec3) -> Aim {
-        Aim::At(self.lattice.from_index(grid.world_to_index(position)))
+        Aim::At(self.lattice.index_to_lattice(grid.world_to_index(position)))
     }
 
     /// Where a distant light is, in a world direction, in units of the lattice.
