@@ -11,6 +11,9 @@ use crate::scene::{Difference, Scene};
 /// Most memory for the texels.
 const MOST_BYTES: u64 = 512 << 20;
 
+/// Most optical thickness, from texel to texel, of the densest matter: light would be more than some 5 % off.
+const MOST_THICKNESS: f32 = 1.0;
+
 /// Where shadows will come from.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Plan {
@@ -18,6 +21,8 @@ pub(super) enum Plan {
     Exact,
     /// As above, since no grid that holds so many light points would be fine enough.
     TooManyPoints,
+    /// As above, since light would be lost between two texels of the finest grid.
+    TooDense,
     /// A grid.
     Grid(Layout),
 }
@@ -29,7 +34,11 @@ impl Plan {
         if settings.shadows == Shadows::Exact || scene.render.max_scatter == 0 || points == 0 {
             return Self::Exact;
         }
-        Layout::within(&scene.medium, points, MOST_BYTES).map_or(Self::TooManyPoints, Self::Grid)
+        match Layout::within(&scene.medium, points, MOST_BYTES) {
+            None => Self::TooManyPoints,
+            Some(layout) if layout.thickness(&scene.medium) > MOST_THICKNESS => Self::TooDense,
+            Some(layout) => Self::Grid(layout),
+        }
     }
 
     /// What a user should know of it.
@@ -38,6 +47,10 @@ impl Plan {
             Self::TooManyPoints => Some(
                 "`raymarch` marches every shadow ray, which is slow: shadows of so many points on lights fit 512 MiB only at a grid \
                  too coarse to use; fewer `render.raymarch.light_samples` or lights make it fast",
+            ),
+            Self::TooDense => Some(
+                "`raymarch` marches every shadow ray, which is slow: matter is so dense that light is lost within a fraction of a voxel, which \
+                 cached shadows are too coarse for; a lower `medium.density` makes it fast",
             ),
             Self::Grid(layout) if layout.is_coarse() => Some(
                 "`raymarch` keeps shadows in cells wider than a voxel, to stay within 512 MiB; fewer \

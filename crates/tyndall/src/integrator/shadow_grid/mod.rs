@@ -129,6 +129,13 @@ impl Layout {
         sweeps::most_bytes(self.lattice.texels(), points)
     }
 
+    /// Optical thickness from texel to texel in the densest matter.
+    pub fn thickness(&self, medium: &Medium) -> f32 {
+        let [_, most] = medium.transfer().opacity_range(medium.volume().value_range().map(cast::single));
+        let voxels = self.lattice.spacing().into_iter().fold(0.0, f32::max);
+        medium.density() * most * (voxels * medium.volume().grid().voxel_size())
+    }
+
     /// Whether texels are more than a voxel apart.
     pub fn is_coarse(&self) -> bool {
         self.lattice.spacing().iter().any(|&voxels| voxels > 1.0)
