@@ -10,7 +10,7 @@ use super::between::StepEnds;
 use super::march_notes::MarchNotes;
 use super::skip::{LaneCells, Skip};
 use super::{Medium, Track};
-use crate::math::{Vec3, cast};
+use crate::math::{Rgb, Vec3, cast};
 use crate::simd::{Kernel, Lanes, Level, MOST_LANES};
 use crate::transfer::OpacityLanes;
 use fearless_simd::prelude::*;
@@ -71,12 +71,28 @@ pub(crate) struct Sample {
 }
 
 impl<S: Lanes> PacketSample<S> {
-    /// Where a lane's step is seen: between what is visible of it before and behind. In constant thin matter this is its
-    /// middle.
+    /// How many places a lane's step is seen at: two where it is thick and holds something narrow, which light may reach from
+    /// either side.
     #[inline(always)]
-    pub fn seen(&self, medium: &Medium, lane: usize) -> Sample {
+    pub fn places(&self, lane: usize) -> usize {
+        1 + usize::from(self.ends.is_narrow(lane) && self.thickness.as_slice()[lane] > THICK)
+    }
+
+    /// Radiance that a lane's step emits, per unit of what is visible of it.
+    #[inline(always)]
+    pub fn emitted(&self, medium: &Medium, lane: usize) -> Rgb {
+        let places = self.places(lane);
+        let at = |place: usize| medium.transfer.emitted(self.seen(medium, lane, place, places).value);
+        (0..places).fold(Rgb::BLACK, |sum, place| sum + at(place)) * (1.0 / places as f32)
+    }
+
+    /// Where a lane's step is seen, at one place of as many as `places`, which stand for equal parts of what is visible of it: between
+    /// what is visible of a part before and behind. In constant thin matter the only place is its middle.
+    #[inline(always)]
+    pub fn seen(&self, medium: &Medium, lane: usize, place: usize, places: usize) -> Sample {
         let (thickness, within) = (self.thickness.as_slice()[lane], self.within.as_slice()[lane]);
-        // Half of what is visible, not half of what there is; both are the same where there is little.
+        let within = (place as f32 + within) / places as f32;
+        // A share of what is visible, not of what there is; both are the same where there is little.
         let share = if thickness > THIN {
             -(-within * (1.0 - (-thickness).exp())).ln_1p() / thickness
         } else {
@@ -91,8 +107,9 @@ impl<S: Lanes> PacketSample<S> {
     }
 }
 
-/// Thickness up to which a step hides nothing of itself.
+/// Thickness up to which a step hides nothing of itself, and above which its front and back are lit differently.
 const THIN: f32 = 1e-3;
+const THICK: f32 = 0.5;
 
 impl Medium {
     /// Optical thickness along a track by steps of `step` world units; stops once it exceeds `enough`.
@@ -308,16 +325,14 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
             let value = medium.volume.value_lanes(simd, to);
             let opacity = medium.transfer.read_lanes(simd, value);
             let (values, opacities) = ([self.value, value], [self.opacity, opacity]);
-            notes.between(simd, here, values);
-            let mut ends = StepEnds::new(simd, values, opacities);
-            if !medium.interpolates {
-                let from = at::<S>(self.origin, self.direction, start);
-                ends.find_border(simd, medium, [from, to], here);
-            }
+            let from = at::<S>(self.origin, self.direction, start);
+            let mut ends = StepEnds::new(simd, medium.interpolates, values, opacities);
+            let inside = if medium.interpolates { here & ends.vary() } else { here };
+            ends.refine(simd, medium, [from, to], inside);
+            notes.between(simd, here, ends.range());
             (self.value, self.opacity, self.known) = (value, opacity, here);
-            let thickness = here.select(ends.mean(simd, medium) * width * medium.density, zero);
+            let thickness = here.select(ends.mean * width * medium.density, zero);
             if thickness.simd_gt(zero).any_true() {
-                let from = at::<S>(self.origin, self.direction, start);
                 let t = start + width * 0.5;
                 return Some(PacketSample { t, width, thickness, from, to, ends, within: self.within });
             }
@@ -372,6 +387,9 @@ impl Track {
     }
 }
 
+/// Thickness that matters little on the way from a light.
+const SLIGHT: f32 = 0.05;
+
 /// Ends of one track's steps, gathered until they fill the lanes, the nearest last: then each lane's next end is in the
 /// lane before it.
 struct Along<'a, S: Lanes> {
@@ -384,6 +402,8 @@ struct Along<'a, S: Lanes> {
     pending: [i32; MOST_LANES],
     /// 1 where the step before an end is one of those to be added, 0 where it is not.
     joined: [f32; MOST_LANES],
+    /// Mean opacity of a step that matters little on the way from a light.
+    slight: f32,
     count: usize,
     /// The last end that was added.
     last: i32,
@@ -414,6 +434,7 @@ impl<'a, S: Lanes> Along<'a, S> {
             step,
             pending: [0; MOST_LANES],
             joined: [0.0; MOST_LANES],
+            slight: SLIGHT / (step * medium.density),
             count: 0,
             // No end has been read if the first value is not known.
             last: if first.is_some() { 0 } else { -1 },
@@ -455,15 +476,17 @@ impl<'a, S: Lanes> Along<'a, S> {
         let position = self.track.lanes(simd, t);
         let value = medium.volume.value_lanes(simd, position);
         let opacity = medium.transfer.read_lanes(simd, value);
-        let before = [value.slide::<1>(self.value), value];
-        let mut ends = StepEnds::new(simd, before, [opacity.successors(self.opacity), opacity]);
+        let values = [value.slide::<1>(self.value), value];
+        let opacities = [opacity.successors(self.opacity), opacity];
         let joined = S::f32s::from_slice(simd, &self.joined[..S::WIDTH]);
-        if !medium.interpolates {
+        let lanes = joined.simd_gt(S::f32s::splat(simd, 0.0));
+        let mut ends = StepEnds::new(simd, medium.interpolates, values, opacities);
+        let narrow = lanes & ends.are_narrow(self.slight);
+        if narrow.any_true() {
             let from = self.track.lanes(simd, t - width);
-            let lanes = joined.simd_gt(S::f32s::splat(simd, 0.0));
-            ends.find_border(simd, medium, [from, position], lanes);
+            ends.refine(simd, medium, [from, position], narrow);
         }
-        self.thickness += ends.mean(simd, medium) * width * joined;
+        self.thickness += ends.mean * width * joined;
         (self.value, self.opacity) = (value, opacity);
         self.count = 0;
         self.joined = [0.0; MOST_LANES];

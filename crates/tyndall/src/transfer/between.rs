@@ -58,6 +58,12 @@ impl<S: Lanes> OpacityLanes<S> {
         }
     }
 
+    /// Whether the two are an edge, between which nothing lies.
+    #[inline(always)]
+    pub fn is_edge(self, simd: S, to: Self) -> S::mask32s {
+        (to.position - self.position).abs().simd_gt(S::f32s::splat(simd, EDGE))
+    }
+
     /// Mean opacity of all values between `self` and `to`.
     #[inline(always)]
     pub fn mean(self, simd: S, to: Self) -> S::f32s {
@@ -81,7 +87,7 @@ pub(super) struct OpacityRead {
 
 impl OpacityRead {
     /// Whether the values between are too few, or the values are an edge.
-    fn is_abrupt(self, to: Self) -> [bool; 2] {
+    pub fn is_abrupt(self, to: Self) -> [bool; 2] {
         let far = (to.position - self.position).abs();
         [far < NEAR, far > EDGE]
     }

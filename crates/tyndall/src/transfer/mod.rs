@@ -195,6 +195,13 @@ impl TransferFunction {
         from.mean(to)
     }
 
+    /// Whether two data values are so far apart that nothing lies between: an edge.
+    pub(crate) fn is_edge(&self, values: [f32; 2]) -> bool {
+        let [from, to] = values.map(|value| self.opacities.read(value, |value| self.exact_opacity(value)));
+        let [_, edge] = from.is_abrupt(to);
+        edge
+    }
+
     /// Where, on the way from one data value to another along which values change linearly, a share of the opacity has
     /// been met.
     pub(crate) fn between(&self, values: [f32; 2], share: f32) -> Between {

@@ -141,7 +141,7 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
                 // Lanes without a sample may have any value.
                 let covered = covered.as_slice()[lane];
                 if covered > 0.0 {
-                    *radiance += medium.transfer().emitted(sample.seen(medium, lane).value) * covered;
+                    *radiance += sample.emitted(medium, lane) * covered;
                 }
             }
         }
@@ -156,7 +156,7 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
             let weight = weight.as_slice()[lane];
             if weight > 0.0 {
                 let here = ViewSample {
-                    at: sample.seen(medium, lane),
+                    at: sample.seen(medium, lane, 0, 1),
                     width: width.as_slice()[lane],
                     w_out: -self.rays[lane].direction,
                     lane,

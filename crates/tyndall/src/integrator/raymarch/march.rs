@@ -148,23 +148,25 @@ impl<S: Lanes> Shader<S, ()> for DirectShader<'_> {
         let Self { raymarch, scene, packet, stop, moved } = self;
         let transfer = scene.medium.transfer();
         if scene.render.max_scatter > 0 {
-            for lane in packet.shaded..packet.count {
+            for part in packet.shaded..2 * packet.count {
+                let (lane, place) = (part / 2, part % 2);
                 let covered = covered.as_slice()[lane];
-                if covered <= 0.0 {
+                let places = sample.places(lane);
+                if covered <= 0.0 || place >= places {
                     continue;
                 }
                 if *moved && stop.reached() {
-                    // The march resumes with this sample, of which some lanes are already shaded.
-                    packet.shaded = lane;
+                    // The march resumes with this sample, of which some places are already shaded.
+                    packet.shaded = part;
                     return false;
                 }
-                let Sample { position, value } = sample.seen(&scene.medium, lane);
+                let Sample { position, value } = sample.seen(&scene.medium, lane, place, places);
                 let at = ShadedPosition { position, value, w_out: -packet.rays[lane].direction };
                 let Some(source) = raymarch.source(simd, scene, &at, &mut packet.lit, stop) else {
-                    packet.shaded = lane;
+                    packet.shaded = part;
                     return false;
                 };
-                packet.radiance[lane] += source * covered;
+                packet.radiance[lane] += source * (covered / places as f32);
                 *moved = true;
             }
         } else {
@@ -175,8 +177,7 @@ impl<S: Lanes> Shader<S, ()> for DirectShader<'_> {
             for lane in 0..glowing {
                 let covered = covered.as_slice()[lane];
                 if covered > 0.0 {
-                    let value = sample.seen(&scene.medium, lane).value;
-                    packet.radiance[lane] += transfer.emitted(value) * covered;
+                    packet.radiance[lane] += sample.emitted(&scene.medium, lane) * covered;
                 }
             }
             *moved = true;
@@ -194,7 +195,7 @@ pub struct Packet {
     tracks: [Track; MOST_LANES],
     /// The step at which to resume.
     k: [i32; MOST_LANES],
-    /// Number of lanes whose position at that step has already been shaded.
+    /// Number of places at that step that have already been shaded, two for each lane.
     shaded: usize,
     /// What has been found at the next of them.
     lit: LitSoFar,
