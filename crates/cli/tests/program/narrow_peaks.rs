@@ -50,7 +50,7 @@ impl Peak {
             "transfer_function": { "points": points },
             "medium": { "density": self.density },
             "lights": [],
-            "camera": { "type": "orthographic", "position": self.view.map(|x| middle + x), "target": [middle; 3], "up": [0.1, 1, 0.2], "height": 20 },
+            "camera": { "type": "orthographic", "position": self.view.map(|x| middle + x), "target": [middle, middle, middle], "up": [0.1, 1, 0.2], "height": 20 },
             "film": { "size": [24, 24], "background": "transparent" },
             "render": { "max_scatter": 0 },
         })
@@ -65,7 +65,11 @@ fn seen(image: &Image) -> [f64; 3] {
 }
 
 fn with_samples(look: &Value, way: Way) -> Value {
-    let samples = if way.method == "path" { 1000 } else { 32 };
+    let samples = match way.method {
+        "path" => 1000,
+        "photon" => 8,
+        _ => 32,
+    };
     tyndall_live::document::apply(look, &json!({ "render": { "samples": samples } }))
 }
 
