@@ -178,7 +178,7 @@ fn what_is_left_out_has_its_default() {
             "/render",
             json!({
                 "integrator": "path", "max_scatter": 64, "seed": 0,
-                "raymarch": { "step": 0.5, "light_samples": 16 }, "path": { "history_memory": 512 },
+                "raymarch": { "step": 0.5, "light_samples": 16, "shadows": "cached" }, "path": { "history_memory": 512 },
                 "photon": {
                     "photons": 1_048_576, "radius": 1.5, "segments": 7, "steps_per_voxel": 2.0, "gather_spacing": 1.5,
                     "estimate": "point", "nearest": 32, "histories": "interactions", "history_bits": 64, "bins": "quantile", "spatial": "cells"
