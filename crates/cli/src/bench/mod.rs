@@ -202,7 +202,7 @@ const CORE: &[Table] = &[
     table("latency", 35.0, |run| core::latency(&run.effort, run.level)),
     table("costs", 10.0, |run| scene_edits::costs(&run.effort, run.level)),
     table("growth", 30.0, |run| growth::curves(&run.effort, run.level)),
-    table("first-pictures", 60.0, |run| scans::first_pictures(&run.effort, run.level, &run.scans)),
+    table("first-pictures", 240.0, |run| scans::first_pictures(&run.effort, run.level, &run.scans)),
 ];
 
 const LOOKS: &[Table] = &[

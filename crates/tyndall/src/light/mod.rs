@@ -115,12 +115,6 @@ impl Light {
         }
     }
 
-    /// Whether it is infinitely far, so that [`Self::sample`] is the same from everywhere.
-    #[must_use]
-    pub fn is_distant(&self) -> bool {
-        matches!(self, Self::Directional(_) | Self::Environment(_))
-    }
-
     /// Where a ray passes the light, if it passes its emitting side.
     #[inline]
     #[must_use]

@@ -8,6 +8,7 @@ use super::bricks::EDGE;
 use super::course::{Axes, Course};
 use super::slab::{Slab, union};
 use super::step::{Crossings, RowWay, Step};
+use super::texels::{PassedRays, PlaneOfBrick, RayGrid};
 use super::{Aim, CLOSE, FULL, Surroundings};
 use crate::math::cast;
 use crate::simd::{Kernel, Lanes, Level, MOST_LANES, one_minus_exp};
@@ -45,7 +46,7 @@ pub(super) struct Fan {
     /// Transmittances to the planes of a slab, row by row of rays, and in it plane by plane.
     passed: Vec<u8>,
     /// Where rays cross these planes, along u and v; none where the light is still ahead.
-    planes: Vec<Grid>,
+    planes: Vec<RayGrid>,
 }
 
 /// Slopes of rays from a near point, in lattice units per plane.
@@ -183,7 +184,13 @@ impl Fan {
         self.next = std::mem::replace(&mut self.state, next);
         self.passed = passed;
         for n in slab.first..slab.first + slab.count {
-            self.planes.push(Grid::new([0, 1].map(|i| self.crossings(slab.first, n as f64, i))));
+            let crossings = [0, 1].map(|i| self.crossings(slab.first, n as f64, i));
+            let is_distant = matches!(self.aim, Aim::Distant(_));
+            self.planes.push(if is_distant {
+                RayGrid::parallel(crossings)
+            } else {
+                RayGrid::Spread(crossings)
+            });
         }
     }
 
@@ -341,7 +348,7 @@ impl Fan {
         let lane = S::f32s::from_fn(simd, |lane| lane as f32);
         let start = crossings.first + ROW_PAD as f32;
         for first in (met.rays.start / S::WIDTH * S::WIDTH..met.rays.end).step_by(S::WIDTH) {
-            let extinction = if crossings.apart == 1.0 {
+            let extinction = if matches!(self.aim, Aim::Distant(_)) {
                 let cell = start.floor();
                 let share = S::f32s::splat(simd, start - cell);
                 let cell = cast::index(cell) + first;
@@ -411,117 +418,11 @@ impl Fan {
         from..cast::index((p[u] + away).floor() + 1.0).clamp(from, nu)
     }
 
-    /// Transmittances at a brick's texels in the `m`-th plane of a slab, between those of the four rays around each. `brick` is where it is
-    /// along u and v.
+    /// Transmittances at a brick's texels in the `m`-th plane of a slab. `brick` is where it is along u and v.
     #[inline(always)]
-    pub fn texels(&self, slab: &Slab, m: usize, [brick_u, brick_v]: [usize; 2]) -> PlaneOfBrick {
-        let [u, v] = [brick_u * EDGE, brick_v * EDGE];
-        let [rays, rows] = self.rays;
-        let row = |j: usize| self.passed.get((j * EDGE + m) * rays..).unwrap_or(&[]);
-        let mut plane = PlaneOfBrick::default();
-        match self.planes.get(m) {
-            Some(Grid::Parallel { before: [i, j], share: [share_u, share_v] }) => {
-                let (mut around, mut next) = ([0; EDGE + 1], [0; EDGE + 1]);
-                for k in 0..=EDGE {
-                    let row = row(j + v + k);
-                    around[k] = word(row, i + u);
-                    next[k] = u64::from(row.get(i + u + EDGE).copied().unwrap_or(0));
-                }
-                let left = between_rows(&around, *share_v);
-                let last = between_rows(&next, *share_v);
-                let mut right = [0; EDGE];
-                for k in 0..EDGE {
-                    right[k] = left[k] >> 8 | last[k] << 56;
-                }
-                plane = PlaneOfBrick { kept: mix(&left, &right, *share_u), reached: [u64::MAX; EDGE] };
-            }
-            Some(Grid::Spread([at_u, at_v])) => {
-                for k in 0..EDGE {
-                    let lower = (((v + k) as f32 - at_v.first) * at_v.inverse).clamp(0.0, (rows - 2) as f32);
-                    let j = cast::index(lower);
-                    let (a, b, share_v) = (row(j), row(j + 1), lower - j as f32);
-                    let reached = self.reached(slab.first + m, v + k);
-                    for texel in u.max(reached.start)..(u + EDGE).min(reached.end) {
-                        let along =
-                            ((texel as f32 - at_u.first) * at_u.inverse).clamp(0.0, (rays - 2) as f32);
-                        let i = cast::index(along);
-                        let between =
-                            |i: usize| f32::from(a[i]) + (f32::from(b[i]) - f32::from(a[i])) * share_v;
-                        let (left, right) = (between(i), between(i + 1));
-                        let kept = cast::index((right - left) * (along - i as f32) + left + 0.5) as u64;
-                        plane.kept[k] |= kept << (8 * (texel - u));
-                        plane.reached[k] |= 0xFF << (8 * (texel - u));
-                    }
-                }
-            }
-            None => {}
-        }
-        plane
+    pub fn texels(&self, slab: &Slab, m: usize, brick: [usize; 2]) -> PlaneOfBrick {
+        let rays = PassedRays { bytes: &self.passed, rays: self.rays, plane: m };
+        let reached = |row| self.reached(slab.first + m, row);
+        self.planes.get(m).map_or_else(PlaneOfBrick::default, |grid| grid.texels(&rays, brick, reached))
     }
-}
-
-/// Transmittances at a brick's texels in a plane.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct PlaneOfBrick {
-    /// Row by row along v; in the bytes of a word along u, lowest first.
-    pub kept: [u64; EDGE],
-    /// Bytes of ones for the texels that the fan reaches; the others are zeros.
-    pub reached: [u64; EDGE],
-}
-
-/// How rays cross a plane, along u and v.
-#[derive(Clone, Copy, Debug)]
-enum Grid {
-    /// Rays of a distant point are as far from each other as texels.
-    Parallel {
-        /// Number of the last ray before the first texel.
-        before: [usize; 2],
-        /// Share of the ray after it there, in parts of 256.
-        share: [u16; 2],
-    },
-    Spread([Crossings; 2]),
-}
-
-impl Grid {
-    fn new([at_u, at_v]: [Crossings; 2]) -> Self {
-        if at_u.apart != 1.0 {
-            return Self::Spread([at_u, at_v]);
-        }
-        let before = [cast::index(-at_u.first), cast::index(-at_v.first)];
-        let share = [part(-at_u.first - before[0] as f32), part(-at_v.first - before[1] as f32)];
-        Self::Parallel { before, share }
-    }
-}
-
-/// Eight bytes of a row, the first one lowest; 0 where there are not so many.
-#[inline(always)]
-fn word(row: &[u8], first: usize) -> u64 {
-    row.get(first..).and_then(|rest| rest.first_chunk()).map_or(0, |bytes| u64::from_le_bytes(*bytes))
-}
-
-/// A share in parts of 256.
-fn part(share: f32) -> u16 {
-    cast::round_u16(share * 256.0)
-}
-
-/// Between neighbouring rows, by the second's share in parts of 256.
-#[inline(always)]
-fn between_rows(rows: &[u64; EDGE + 1], share: u16) -> [u64; EDGE] {
-    let (mut a, mut b) = ([0; EDGE], [0; EDGE]);
-    a.copy_from_slice(&rows[..EDGE]);
-    b.copy_from_slice(&rows[1..]);
-    mix(&a, &b, share)
-}
-
-/// Between the bytes of words, by the second's share in parts of 256; rounded.
-#[inline(always)]
-fn mix(a: &[u64; EDGE], b: &[u64; EDGE], share: u16) -> [u64; EDGE] {
-    let (a, b): (&[u16; 4 * EDGE], &[u16; 4 * EDGE]) = (bytemuck::cast_ref(a), bytemuck::cast_ref(b));
-    let mut mixed = [0; 4 * EDGE];
-    for i in 0..mixed.len() {
-        let lower = (a[i] & 0xFF) * (256 - share) + (b[i] & 0xFF) * share + 128;
-        let upper = (a[i] >> 8) * (256 - share) + (b[i] >> 8) * share + 128;
-        mixed[i] = lower >> 8 | upper & 0xFF00;
-    }
-    bytemuck::cast(mixed)
 }

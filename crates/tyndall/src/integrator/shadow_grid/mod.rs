@@ -14,6 +14,7 @@ mod lattice;
 mod slab;
 mod step;
 mod sweeps;
+mod texels;
 
 use bricks::{Bricks, EDGE, OpaqueCells};
 use lattice::Lattice;

@@ -2,9 +2,11 @@
 
 use super::bricks::{Bricks, EDGE};
 use super::course::{Axes, Course};
-use super::fan::{Fan, PlaneOfBrick};
+use super::fan::Fan;
+use super::lattice::Lattice;
 use super::slab::Slab;
-use super::{Aim, Lattice, Surroundings};
+use super::texels::PlaneOfBrick;
+use super::{Aim, Surroundings};
 use crate::integrator::Limits;
 use crate::medium::Medium;
 use crate::simd::{Kernel, Lanes, Level};
