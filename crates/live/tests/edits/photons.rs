@@ -221,3 +221,16 @@ fn slices_that_an_edit_of_density_widens_ask_for_all_that_they_gather() {
     live.set_scene(scene(&value));
     assert_some_segments_change(&mut live, &value, "a brighter lamp");
 }
+
+/// A peak so narrow that no step of a view ray ends in it changes the steps whose ends lie on both sides of it.
+#[test]
+fn values_between_the_ends_of_steps() {
+    let mut value = base("photon");
+    let point = |value: f64, opacity: f64| json!({ "value": value, "opacity": opacity, "emission": 1 });
+    let points = |opacity: f64| json!([point(0.4999, 0.0), point(0.5, opacity), point(0.5001, 0.0)]);
+    value["volume"] = json!({ "procedural": { "kind": "sphere", "size": [20, 20, 20] } });
+    value["film"]["size"] = json!([32, 32]);
+    value["medium"]["density"] = 900.into();
+    value["render"]["max_scatter"] = 0.into();
+    assert_each_changes_some(&mut value, points, [0.5, 0.6, 0.5, 0.4]);
+}

@@ -62,6 +62,14 @@ pub fn whole(x: f64) -> u64 {
     x as u64
 }
 
+/// Nearest whole number; saturates at the ends of `i32`; NaN becomes 0.
+#[inline]
+#[must_use]
+#[expect(clippy::cast_possible_truncation, reason = "`as` saturates, which is what is documented")]
+pub fn round_i32(x: f64) -> i32 {
+    x.round() as i32
+}
+
 /// Nearest single-precision number.
 #[inline]
 #[must_use]

@@ -1,14 +1,18 @@
-//! Marching: the midpoint rule on one grid of steps per track.
+//! Marching on one grid of steps per track, each with all that lies between the data values at its two ends.
 //!
-//! Step `k` covers `[k step, (k + 1) step]`, the last one what is left. The grid does not depend on the transfer
-//! function, so skipping empty space leaves every other sample where it was and changes no bit. Whether a sample is
-//! skipped depends only on the cell that it is in.
+//! Step `k` covers `[k step, (k + 1) step]`, the last one what is left. Its extinction is the mean over all values
+//! between those at its ends, as if values changed linearly along it \[Engel01\]; with interpolation `nearest` it is that
+//! of the first value up to where the value changes, and of the second from there. The grid does not depend on the
+//! transfer function. Steps between two empty cells are skipped, which changes no bit: such cells touch, so that all
+//! values between belong to empty cells.
 
+use super::between::StepEnds;
 use super::march_notes::MarchNotes;
-use super::skip::Skip;
+use super::skip::{LaneCells, Skip};
 use super::{Medium, Track};
-use crate::math::cast;
+use crate::math::{Vec3, cast};
 use crate::simd::{Kernel, Lanes, Level, MOST_LANES};
+use crate::transfer::OpacityLanes;
 use fearless_simd::prelude::*;
 
 /// The steps of one track.
@@ -35,30 +39,63 @@ impl Steps {
         self.count
     }
 
-    #[inline(always)]
-    pub(super) fn midpoint(&self, k: i32, step: f32) -> f32 {
-        let width = if k < self.whole { step } else { self.rest };
-        k as f32 * step + 0.5 * width
+    /// Where a step begins and how wide it is.
+    pub(super) fn at(&self, k: i32, step: f32) -> [f32; 2] {
+        [k as f32 * step, if k < self.whole { step } else { self.rest }]
     }
 }
 
-/// The samples that a packet of tracks takes at once, one per lane.
+/// The steps that a packet of tracks takes at once, one per lane.
 pub(crate) struct PacketSample<S: Lanes> {
-    /// World distance along each track.
+    /// World distance of its middle along each track.
     pub t: S::f32s,
-    /// Width of the step, world units.
+    /// World units.
     pub width: S::f32s,
-    /// In index space.
-    pub position: [S::f32s; 3],
-    /// Data value.
-    pub value: S::f32s,
-    /// Optical thickness of the step; 0 in lanes that take no sample.
+    /// Optical thickness; 0 in lanes that take no step.
     pub thickness: S::f32s,
+    /// Ends in index space.
+    from: [S::f32s; 3],
+    to: [S::f32s; 3],
+    ends: StepEnds<S>,
+    /// The share of the visible matter of the step that is before the sample.
+    within: S::f32s,
 }
 
+/// A position in a step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sample {
+    /// In index space.
+    pub position: Vec3,
+    /// Data value.
+    pub value: f32,
+}
+
+impl<S: Lanes> PacketSample<S> {
+    /// Where a lane's step is seen: between what is visible of it before and behind. In constant thin matter this is its
+    /// middle.
+    #[inline(always)]
+    pub fn seen(&self, medium: &Medium, lane: usize) -> Sample {
+        let (thickness, within) = (self.thickness.as_slice()[lane], self.within.as_slice()[lane]);
+        // Half of what is visible, not half of what there is; both are the same where there is little.
+        let share = if thickness > THIN {
+            -(-within * (1.0 - (-thickness).exp())).ln_1p() / thickness
+        } else {
+            within
+        };
+        let found = self.ends.place(medium, lane, share);
+        let along = |axis: usize| {
+            let (from, to) = (self.from[axis].as_slice()[lane], self.to[axis].as_slice()[lane]);
+            (to - from).mul_add(found.share, from)
+        };
+        Sample { position: Vec3::new(along(0), along(1), along(2)), value: found.value }
+    }
+}
+
+/// Thickness up to which a step hides nothing of itself.
+const THIN: f32 = 1e-3;
+
 impl Medium {
-    /// Optical thickness along a track by the midpoint rule with steps of `step` world units; stops once it exceeds
-    /// `enough`.
+    /// Optical thickness along a track by steps of `step` world units; stops once it exceeds `enough`.
     #[must_use]
     pub fn optical_thickness(&self, level: Level, track: &Track, step: f32, enough: f32) -> f32 {
         struct Thickness<'a>(&'a Medium, &'a Track, f32, f32);
@@ -68,31 +105,54 @@ impl Medium {
             #[inline(always)]
             fn run<S: Lanes>(self, simd: S) -> f32 {
                 let Self(medium, track, step, enough) = self;
-                medium.thickness_lanes(simd, track, step, enough)
+                medium.thickness_lanes(simd, track, None, step, enough)
             }
         }
         level.run(Thickness(self, track, step, enough))
     }
 
-    /// [`Self::optical_thickness`], many steps at once.
+    /// [`Self::optical_thickness`], many steps at once. `first` is what the track begins in, if that is known.
     #[inline(always)]
-    pub(crate) fn thickness_lanes<S: Lanes>(&self, simd: S, track: &Track, step: f32, enough: f32) -> f32 {
+    pub(crate) fn thickness_lanes<S: Lanes>(
+        &self,
+        simd: S,
+        track: &Track,
+        first: Option<&TrackStart<S>>,
+        step: f32,
+        enough: f32,
+    ) -> f32 {
         let steps = Steps::new(track, step);
-        let mut along = Along::new(simd, self, track, steps, step);
+        let mut along = Along::new(simd, self, track, steps, step, first);
         let mut k = 0;
         for cell in self.majorants.walk(track) {
             if cell.most <= 0.0 {
-                // Up to the last step whose midpoint may be in this cell; the loop below corrects it.
-                k = k.max(cast::truncate(cell.end / step - 0.5)).min(steps.count);
+                continue;
             }
-            while k < steps.count && along.midpoint(k) < cell.end {
-                if cell.most > 0.0 && along.push(k) && along.take() > enough {
+            k = k.max(cast::truncate(cell.start / step)).min(steps.count);
+            while k < steps.count && k as f32 * step < cell.end {
+                if along.push(k) > enough {
                     return along.thickness();
                 }
                 k += 1;
             }
         }
-        if along.count > 0 { along.take() } else { along.thickness() }
+        along.rest()
+    }
+}
+
+/// The data value where tracks begin, and its opacity, in all lanes. It need not be exactly that of the data there, but is
+/// that of the matter from which light is seen.
+#[derive(Clone, Copy)]
+pub(crate) struct TrackStart<S: Lanes> {
+    value: S::f32s,
+    opacity: OpacityLanes<S>,
+}
+
+impl<S: Lanes> TrackStart<S> {
+    #[inline(always)]
+    pub fn new(simd: S, medium: &Medium, value: f32) -> Self {
+        let value = S::f32s::splat(simd, value);
+        Self { value, opacity: medium.transfer.read_lanes(simd, value) }
     }
 }
 
@@ -107,10 +167,18 @@ pub(crate) struct PacketMarch<'a, S: Lanes> {
     whole: S::i32s,
     count: S::i32s,
     rest: S::f32s,
-    /// Where in its step a sample is, as a share of the step's width.
+    /// See [`PacketSample::within`].
     within: S::f32s,
     skip: Skip<'a, S>,
+    /// Whether steps are short enough that those between empty cells can be skipped.
+    skips: bool,
     k: S::i32s,
+    /// Value and opacity where step `k` begins, in the lanes `known`.
+    value: S::f32s,
+    opacity: OpacityLanes<S>,
+    known: S::mask32s,
+    /// The cells where step `k` begins; `None` at the first step.
+    cells: Option<LaneCells<S>>,
     /// Steps for which every lane stays in cells that hold matter.
     occupied: i32,
     /// Lanes that go on.
@@ -124,6 +192,7 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
         let mut numbers = [[0.0; MOST_LANES]; 8];
         let mut whole = [0; MOST_LANES];
         let mut count = [0; MOST_LANES];
+        let mut farthest = 0.0_f32;
         for (lane, track) in tracks.iter().enumerate() {
             let steps = Steps::new(track, step);
             let (o, d) = (track.ray.origin, track.ray.direction);
@@ -134,9 +203,9 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
             }
             whole[lane] = steps.whole;
             count[lane] = steps.count;
+            farthest = farthest.max(d.abs().max_element() * step);
         }
         let [ox, oy, oz, dx, dy, dz, rest, within] = &numbers;
-        let within = load(simd, within);
         let origin = [load(simd, ox), load(simd, oy), load(simd, oz)];
         let direction = [load(simd, dx), load(simd, dy), load(simd, dz)];
         let count = S::i32s::from_slice(simd, &count[..S::WIDTH]);
@@ -150,9 +219,14 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
             whole: S::i32s::from_slice(simd, &whole[..S::WIDTH]),
             count,
             rest: load(simd, rest),
-            within,
-            skip: Skip::new(simd, medium, origin, direction, within, step),
+            within: load(simd, within),
+            skip: Skip::new(simd, medium, origin, direction, step),
+            skips: farthest < medium.majorants.edge(),
             k,
+            value: S::f32s::splat(simd, 0.0),
+            opacity: OpacityLanes::none(simd),
+            known: k.simd_lt(k),
+            cells: None,
             occupied: 0,
             active: k.simd_lt(count),
         }
@@ -169,6 +243,8 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
     pub fn go_to(&mut self, k: S::i32s) {
         self.k = k;
         self.occupied = 0;
+        self.cells = None;
+        self.known = k.simd_lt(k);
         self.active = k.simd_lt(self.count);
     }
 
@@ -179,7 +255,7 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
         self.go_to(k);
     }
 
-    /// The next samples, at least one of which met matter; everything read is reported to `notes`. No lane's bits
+    /// The next steps, at least one of which met matter; everything read is reported to `notes`. No lane's bits
     /// depend on what is in the others.
     #[inline(always)]
     pub fn next<N: MarchNotes<S>>(&mut self, notes: &mut N) -> Option<PacketSample<S>> {
@@ -187,37 +263,63 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
         let zero = S::f32s::splat(simd, 0.0);
         while self.active.any_true() {
             let k = self.k;
+            let start = k.to_float::<S::f32s>() * self.width;
             let width = k.simd_lt(self.whole).select(S::f32s::splat(simd, self.width), self.rest);
-            let t = k.to_float::<S::f32s>() * self.width + width * self.within;
-            let position = at::<S>(self.origin, self.direction, t);
+            let to = at::<S>(self.origin, self.direction, start + width);
             let mut here = self.active;
             self.k = k + 1;
-            if self.occupied == 0 {
-                let cells = self.skip.cells::<N>(position);
-                notes.cells(simd, here & cells.empty, cells.number);
-                let leap = self.skip.leap(k, &cells);
-                here &= !cells.empty;
-                self.k = cells.empty.select(leap, self.k);
-                if (self.active & cells.empty).any_true() {
+            if self.occupied == 0 && self.skips {
+                let before = match self.cells.take() {
+                    Some(cells) => cells,
+                    None => self.skip.cells::<N>(at::<S>(self.origin, self.direction, start)),
+                };
+                let cells = self.skip.cells::<N>(to);
+                let leap = self.skip.leap(self.k, &cells);
+                let empty = before.empty & cells.empty;
+                let skipped = here & empty;
+                notes.cells(simd, skipped, before.number);
+                notes.cells(simd, skipped, cells.number);
+                here &= !empty;
+                self.k = empty.select(leap, self.k);
+                let held = (before.empty | cells.empty) & self.active;
+                self.cells = Some(cells);
+                if held.any_true() {
                     if !here.any_true() {
+                        self.known = here;
                         self.active &= self.k.simd_lt(self.count);
                         continue;
                     }
                 } else {
                     // Lanes that have ended do not limit the count.
                     let far = S::i32s::splat(simd, i32::MAX);
-                    self.occupied = least(self.active.select(leap - k, far).as_slice()) - 1;
+                    self.occupied = least(self.active.select(leap - (k + 1), far).as_slice());
                 }
             } else {
-                self.occupied -= 1;
+                self.occupied -= i32::from(self.skips);
             }
             self.active &= self.k.simd_lt(self.count);
-            let value = self.medium.volume.value_lanes(simd, position);
-            notes.values(simd, here, value);
-            let opacity = self.medium.transfer.opacity_lanes(simd, value);
-            let thickness = here.select(opacity * width * self.medium.density, zero);
+            let medium = self.medium;
+            let fresh = here & !self.known;
+            if fresh.any_true() {
+                let value = medium.volume.value_lanes(simd, at::<S>(self.origin, self.direction, start));
+                self.value = fresh.select(value, self.value);
+                self.opacity = medium.transfer.read_lanes(simd, value).or(fresh, self.opacity);
+            }
+            let value = medium.volume.value_lanes(simd, to);
+            let opacity = medium.transfer.read_lanes(simd, value);
+            let (values, opacities) = ([self.value, value], [self.opacity, opacity]);
+            notes.between(simd, here, values);
+            let mut ends = StepEnds::new(simd, values, opacities);
+            if !medium.interpolates {
+                let from = at::<S>(self.origin, self.direction, start);
+                ends.find_border(simd, medium, [from, to], here);
+            }
+            (self.value, self.opacity, self.known) = (value, opacity, here);
+            let thickness = here.select(ends.mean(simd, medium) * width * medium.density, zero);
             if thickness.simd_gt(zero).any_true() {
-                return Some(PacketSample { t, width, position, value, thickness });
+                let from = at::<S>(self.origin, self.direction, start);
+                let t = start + width * 0.5;
+                return Some(PacketSample { t, width, thickness, from, to, ends, within: self.within });
             }
         }
         None
@@ -247,16 +349,18 @@ impl Track {
         Steps::new(self, step).count
     }
 
-    /// The same track, with each sample of a march moved from the middle of its step by the share `by` of the step's width, -1/2 to 1/2.
+    /// The same track, with each sample of a march moved from the middle of what is seen of its step by the share `by` of it,
+    /// -1/2 to 1/2.
     #[must_use]
     pub fn shifted(&self, by: f32) -> Self {
         Self { shift: by, ..*self }
     }
 
-    /// The middle of a step.
+    /// Where a step begins and ends.
     #[must_use]
-    pub fn midpoint(&self, k: i32, step: f32) -> f32 {
-        Steps::new(self, step).midpoint(k, step)
+    pub fn step_ends(&self, k: i32, step: f32) -> [f32; 2] {
+        let [start, width] = Steps::new(self, step).at(k, step);
+        [start, start + width]
     }
 
     /// Index-space positions at distances inside the medium.
@@ -268,54 +372,111 @@ impl Track {
     }
 }
 
-/// Steps of one track, gathered until they fill the lanes.
+/// Ends of one track's steps, gathered until they fill the lanes, the nearest last: then each lane's next end is in the
+/// lane before it.
 struct Along<'a, S: Lanes> {
     simd: S,
     medium: &'a Medium,
     track: &'a Track,
     steps: Steps,
     step: f32,
+    /// The ends, numbered as the steps that begin there.
     pending: [i32; MOST_LANES],
+    /// 1 where the step before an end is one of those to be added, 0 where it is not.
+    joined: [f32; MOST_LANES],
     count: usize,
+    /// The last end that was added.
+    last: i32,
+    /// The last lanes; only the farthest end, which is in the first of them, is read.
+    value: S::f32s,
+    opacity: OpacityLanes<S>,
     thickness: S::f32s,
 }
 
 impl<'a, S: Lanes> Along<'a, S> {
     #[inline(always)]
-    fn new(simd: S, medium: &'a Medium, track: &'a Track, steps: Steps, step: f32) -> Self {
+    fn new(
+        simd: S,
+        medium: &'a Medium,
+        track: &'a Track,
+        steps: Steps,
+        step: f32,
+        first: Option<&TrackStart<S>>,
+    ) -> Self {
         let thickness = S::f32s::splat(simd, 0.0);
-        Self { simd, medium, track, steps, step, pending: [0; MOST_LANES], count: 0, thickness }
+        let unknown = TrackStart { value: thickness, opacity: OpacityLanes::none(simd) };
+        let TrackStart { value, opacity } = *first.unwrap_or(&unknown);
+        Self {
+            simd,
+            medium,
+            track,
+            steps,
+            step,
+            pending: [0; MOST_LANES],
+            joined: [0.0; MOST_LANES],
+            count: 0,
+            // No end has been read if the first value is not known.
+            last: if first.is_some() { 0 } else { -1 },
+            value,
+            opacity,
+            thickness,
+        }
+    }
+
+    /// Adds a step; returns the thickness so far if lanes were taken, else 0.
+    #[inline(always)]
+    fn push(&mut self, k: i32) -> f32 {
+        let mut found = 0.0;
+        if self.last != k {
+            found = self.push_end(k, 0.0);
+        }
+        self.push_end(k + 1, 1.0).max(found)
     }
 
     #[inline(always)]
-    fn midpoint(&self, k: i32) -> f32 {
-        self.steps.midpoint(k, self.step)
-    }
-
-    /// Whether the lanes are now full.
-    #[inline(always)]
-    fn push(&mut self, k: i32) -> bool {
-        self.pending[self.count] = k;
+    fn push_end(&mut self, k: i32, joined: f32) -> f32 {
+        self.last = k;
         self.count += 1;
-        self.count == S::WIDTH
+        let lane = S::WIDTH - self.count;
+        (self.pending[lane], self.joined[lane]) = (k, joined);
+        if self.count == S::WIDTH { self.take() } else { 0.0 }
     }
 
-    /// Takes the pending samples; returns the thickness so far.
+    /// Adds the steps that end at the pending ends; returns the thickness so far.
     #[inline(always)]
     fn take(&mut self) -> f32 {
         let simd = self.simd;
+        let medium = self.medium;
         let k = S::i32s::from_slice(simd, &self.pending[..S::WIDTH]);
-        let whole = k.simd_lt(S::i32s::splat(simd, self.steps.whole));
-        let width = whole.select(S::f32s::splat(simd, self.step), S::f32s::splat(simd, self.steps.rest));
-        let t = k.to_float::<S::f32s>() * self.step + width * 0.5;
+        let end = k.to_float::<S::f32s>() * self.step;
+        let partial = k.simd_gt(S::i32s::splat(simd, self.steps.whole));
+        let width = partial.select(S::f32s::splat(simd, self.steps.rest), S::f32s::splat(simd, self.step));
+        let t = partial.select(end - self.step + self.steps.rest, end);
         let position = self.track.lanes(simd, t);
-        let value = self.medium.volume.value_lanes(simd, position);
-        let opacity = self.medium.transfer.opacity_lanes(simd, value);
-        let number = S::f32s::from_fn(simd, |lane| lane as f32);
-        let taken = number.simd_lt(S::f32s::splat(simd, self.count as f32));
-        self.thickness += taken.select(opacity * width, S::f32s::splat(simd, 0.0));
+        let value = medium.volume.value_lanes(simd, position);
+        let opacity = medium.transfer.read_lanes(simd, value);
+        let before = [value.slide::<1>(self.value), value];
+        let mut ends = StepEnds::new(simd, before, [opacity.successors(self.opacity), opacity]);
+        let joined = S::f32s::from_slice(simd, &self.joined[..S::WIDTH]);
+        if !medium.interpolates {
+            let from = self.track.lanes(simd, t - width);
+            let lanes = joined.simd_gt(S::f32s::splat(simd, 0.0));
+            ends.find_border(simd, medium, [from, position], lanes);
+        }
+        self.thickness += ends.mean(simd, medium) * width * joined;
+        (self.value, self.opacity) = (value, opacity);
         self.count = 0;
+        self.joined = [0.0; MOST_LANES];
         self.thickness()
+    }
+
+    /// Takes what is pending; returns the thickness.
+    #[inline(always)]
+    fn rest(&mut self) -> f32 {
+        if self.count == 0 {
+            return self.thickness();
+        }
+        self.take()
     }
 
     #[inline(always)]

@@ -7,8 +7,8 @@ pub(crate) trait MarchNotes<S: Lanes> {
     /// Whether empty space is crossed cell by cell, so that each cell is reported.
     const EACH_CELL: bool;
 
-    /// Values that some lanes read.
-    fn values(&mut self, simd: S, lanes: S::mask32s, values: S::f32s);
+    /// All values between the two that some lanes read at the ends of a step.
+    fn between(&mut self, simd: S, lanes: S::mask32s, values: [S::f32s; 2]);
 
     /// Values that one lane reads around its sample.
     fn values_about(&mut self, simd: S, lane: usize, read: S::mask32s, values: S::f32s);
@@ -22,7 +22,7 @@ impl<S: Lanes> MarchNotes<S> for () {
     const EACH_CELL: bool = false;
 
     #[inline(always)]
-    fn values(&mut self, _: S, _: S::mask32s, _: S::f32s) {}
+    fn between(&mut self, _: S, _: S::mask32s, _: [S::f32s; 2]) {}
 
     #[inline(always)]
     fn values_about(&mut self, _: S, _: usize, _: S::mask32s, _: S::f32s) {}

@@ -28,22 +28,22 @@ impl MarchedCollision {
 
 impl Medium {
     /// Flies through an optical depth of `depth`, or out of the medium (`None`), by a march with steps of `step` world
-    /// units, each with the extinction of its midpoint. For an exponentially distributed depth, distances have the pdf
-    /// that the collision reports. The march makes it biased, unlike [`Self::free_flight`], whose pdf is unknown.
+    /// units, each with the mean extinction of the values between its ends. For an exponentially distributed depth,
+    /// distances have the pdf that the collision reports. The march makes it biased, unlike [`Self::free_flight`], whose
+    /// pdf is unknown.
     #[must_use]
     pub fn marched_flight(&self, track: &Track, depth: f32, step: f32) -> Option<MarchedCollision> {
         let steps = Steps::new(track, step);
         let (mut k, mut met) = (0, 0.0);
         for cell in self.majorants.walk(track) {
             if cell.most <= 0.0 {
-                // Up to the last step whose midpoint may be in this cell; the loop below corrects it.
-                k = k.max(cast::truncate(cell.end / step - 0.5)).min(steps.count());
+                continue;
             }
-            while k < steps.count() && steps.midpoint(k, step) < cell.end {
-                let middle = steps.midpoint(k, step);
-                let sigma_t = if cell.most > 0.0 { self.sigma_t(track.at(middle)) } else { 0.0 };
-                let start = k as f32 * step;
-                let behind = met + sigma_t * 2.0 * (middle - start);
+            k = k.max(cast::truncate(cell.start / step)).min(steps.count());
+            while k < steps.count() && k as f32 * step < cell.end {
+                let [start, width] = steps.at(k, step);
+                let sigma_t = self.mean_sigma_t([track.at(start), track.at(start + width)]);
+                let behind = met + sigma_t * width;
                 if behind > depth {
                     let t = start + (depth - met) / sigma_t;
                     return Some(MarchedCollision {
@@ -58,5 +58,18 @@ impl Medium {
             }
         }
         None
+    }
+
+    /// Mean extinction between two index-space positions as near to each other as steps of a march are: over all values
+    /// between, or of both values where voxels are not interpolated.
+    #[must_use]
+    pub fn mean_sigma_t(&self, ends: [Vec3; 2]) -> f32 {
+        let values = ends.map(|p| self.volume.value(p));
+        let opacity = if self.interpolates {
+            self.transfer.mean_opacity(values)
+        } else {
+            0.5 * (self.transfer.opacity(values[0]) + self.transfer.opacity(values[1]))
+        };
+        self.density * opacity
     }
 }

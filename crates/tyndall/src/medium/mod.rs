@@ -2,6 +2,7 @@
 //!
 //! Extinction is scalar, `sigma_t(v) = density * opacity(v)` per world unit; colour enters as albedo.
 
+mod between;
 mod clip;
 mod emptiness;
 mod free_flight;
@@ -16,7 +17,7 @@ pub use clip::{Clip, ClipShape};
 pub use free_flight::Collision;
 pub(crate) use free_flight::FlightNotes;
 pub use majorants::{CellStretch, CellWalk, MajorantGrid};
-pub(crate) use march::{PacketMarch, PacketSample};
+pub(crate) use march::{PacketMarch, PacketSample, Sample, TrackStart};
 pub(crate) use march_notes::MarchNotes;
 pub use marched_flight::MarchedCollision;
 
@@ -24,7 +25,7 @@ use crate::math::{Binade, Interval, Ray, Vec3};
 use crate::scattering::{Brdf, Event, Phase, Surface, surface_share};
 use crate::simd::{Lanes, one_minus_exp};
 use crate::transfer::{Optics, TransferFunction};
-use crate::volume::Volume;
+use crate::volume::{Interpolation, Volume};
 use fearless_simd::prelude::*;
 use std::sync::Arc;
 
@@ -63,6 +64,8 @@ pub struct Medium {
     brdf: Brdf,
     gradient_factor: f32,
     gradient_range: f32,
+    /// Whether values lie between those of voxels.
+    interpolates: bool,
 }
 
 /// A ray inside the medium: in index space, where `t` is still the world distance, from where it
@@ -75,7 +78,7 @@ pub struct Track {
     length: f32,
     /// World distance before it.
     before: f32,
-    /// Offset of each sample of a march from the middle of its step, as a share of the step's width: -1/2 to 1/2.
+    /// Offset of each sample of a march from the middle of what is seen of its step, as a share of it: -1/2 to 1/2.
     shift: f32,
 }
 
@@ -133,6 +136,7 @@ impl Medium {
             brdf: settings.brdf,
             gradient_factor: settings.gradient_factor,
             gradient_range: settings.gradient_range.unwrap_or_else(|| volume.robust_width()),
+            interpolates: volume.interpolation() == Interpolation::Linear,
             volume,
             transfer,
         }

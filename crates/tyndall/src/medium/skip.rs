@@ -13,14 +13,15 @@ pub(super) struct Skip<'a, S: Lanes> {
     dims: [i32; 3],
     edge: f32,
     step: f32,
-    /// Where in its step a sample is, as a share of the step's width.
-    within: S::f32s,
     origin: [S::f32s; 3],
     inverse: [S::f32s; 3],
     /// Infinite where a track does not advance along the axis, so never leaves a cell there; else 0.
     never: [S::f32s; 3],
     forward: [S::mask32s; 3],
 }
+
+/// How near to a region's border, in steps, a step may begin without surely being in the region.
+const UNSURE: f32 = 1.0 / 64.0;
 
 /// The cells that the lanes are in.
 pub(super) struct LaneCells<S: Lanes> {
@@ -39,7 +40,6 @@ impl<'a, S: Lanes> Skip<'a, S> {
         medium: &'a Medium,
         origin: [S::f32s; 3],
         direction: [S::f32s; 3],
-        within: S::f32s,
         step: f32,
     ) -> Self {
         let zero = S::f32s::splat(simd, 0.0);
@@ -53,7 +53,6 @@ impl<'a, S: Lanes> Skip<'a, S> {
             dims: medium.majorants.dims(),
             edge: medium.majorants.edge(),
             step,
-            within,
             origin,
             inverse: [u.select(zero, one / x), v.select(zero, one / y), w.select(zero, one / z)],
             never: [u.select(far, zero), v.select(far, zero), w.select(far, zero)],
@@ -78,8 +77,7 @@ impl<'a, S: Lanes> Skip<'a, S> {
         cell.min(S::i32s::splat(self.simd, self.dims[axis] - 1))
     }
 
-    /// The last step whose sample is surely in the same empty region or in the same cell with matter; at least the
-    /// next step.
+    /// The last step that surely begins in the same empty region or in the same cell with matter as step `k` does.
     #[inline(always)]
     pub fn leap(&self, k: S::i32s, cells: &LaneCells<S>) -> S::i32s {
         let one = S::i32s::splat(self.simd, 1);
@@ -87,9 +85,9 @@ impl<'a, S: Lanes> Skip<'a, S> {
         let leave =
             self.leave(0, cells, extent).min(self.leave(1, cells, extent)).min(self.leave(2, cells, extent));
         // Past the end of every track, and far from the end of the integers.
-        let last = (leave * (1.0 / self.step) - self.within).max(0.0).min(1e9);
+        let last = (leave * (1.0 / self.step) - UNSURE).max(0.0).min(1e9);
         let last: S::i32s = last.to_int();
-        last.max(k + 1)
+        last.max(k)
     }
 
     /// Where the tracks leave that region or cell along an axis.

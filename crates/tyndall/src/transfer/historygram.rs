@@ -132,11 +132,12 @@ impl HistoryGroups {
     }
 
     /// What reading values from bin `first` to bin `last` records in a history.
+    #[inline]
     #[must_use]
     pub fn between(&self, first: usize, last: usize) -> Historygram {
         // Groups ascend with the bins, so all groups between the ends are included.
-        let [first, last] = [first, last].map(|bin| u32::from(self.groups[bin]));
-        Historygram(u128::MAX >> (127 - last) & u128::MAX << first)
+        let [first, last] = [first, last].map(|bin| usize::from(self.groups[bin]));
+        Historygram(UP_TO[last] & FROM[first])
     }
 
     /// The Historygram of changed bins, against which histories are tested \[Jonsson12, sec. 4.2\].
@@ -144,6 +145,20 @@ impl HistoryGroups {
     pub fn query(&self, changed: &BinSet) -> Historygram {
         changed.iter().fold(Historygram::EMPTY, |query, bin| query | self.of(bin))
     }
+}
+
+/// Per group the bits of all groups up to it, and from it on: marches read them at every step.
+static UP_TO: [u128; 128] = groups_beside(true);
+static FROM: [u128; 128] = groups_beside(false);
+
+const fn groups_beside(below: bool) -> [u128; 128] {
+    let mut sets = [0; 128];
+    let mut group = 0;
+    while group < 128 {
+        sets[group] = if below { u128::MAX >> (127 - group) } else { u128::MAX << group };
+        group += 1;
+    }
+    sets
 }
 
 fn group(x: f32) -> u8 {

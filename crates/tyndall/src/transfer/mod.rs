@@ -4,6 +4,7 @@
 //! the later one holds from there on. All optics are evaluated by segment, which a small index finds in
 //! constant time; opacity and emission, which are read most, also come from tables that agree up to rounding.
 
+mod between;
 mod difference;
 mod glow;
 mod historygram;
@@ -11,6 +12,7 @@ mod optics;
 mod presets;
 mod table;
 
+pub(crate) use between::{Between, OpacityLanes};
 pub use difference::{BinSet, TransferDifference};
 pub use historygram::{Grouping, HistoryGroups, Historygram};
 pub use optics::Optics;
@@ -178,6 +180,26 @@ impl TransferFunction {
     #[inline(always)]
     pub(crate) fn opacity_lanes<S: Lanes>(&self, simd: S, values: S::f32s) -> S::f32s {
         self.opacities.opacities(simd, values, |value| self.exact_opacity(value))
+    }
+
+    /// Opacity and its integral at a value per lane.
+    #[inline(always)]
+    pub(crate) fn read_lanes<S: Lanes>(&self, simd: S, values: S::f32s) -> OpacityLanes<S> {
+        self.opacities.read_lanes(simd, values, |value| self.exact_opacity(value))
+    }
+
+    /// Mean opacity of all data values between two.
+    #[must_use]
+    pub fn mean_opacity(&self, values: [f32; 2]) -> f32 {
+        let [from, to] = values.map(|value| self.opacities.read(value, |value| self.exact_opacity(value)));
+        from.mean(to)
+    }
+
+    /// Where, on the way from one data value to another along which values change linearly, a share of the opacity has
+    /// been met.
+    pub(crate) fn between(&self, values: [f32; 2], share: f32) -> Between {
+        let read = |value: f32| self.opacities.read(value, |value| self.exact_opacity(value));
+        Between::of_share(values, share, read)
     }
 
     /// Smallest and largest opacity over data values `[lo, hi]`.

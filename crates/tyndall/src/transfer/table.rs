@@ -3,8 +3,11 @@
 //! A bin that a single point of the function divides keeps two lines, so jumps stay jumps and, up to rounding, the
 //! table equals the function. A bin with several points, or one too steep for single precision, is *rough*: there the
 //! function itself is evaluated.
+//!
+//! Each line also keeps the integral of the opacity up to where it begins, for the mean opacity between two values.
 
 use super::Point;
+use super::between::{OpacityLanes, OpacityRead};
 use crate::math::cast;
 use crate::simd::Lanes;
 use crate::volume::ValueBins;
@@ -12,6 +15,12 @@ use fearless_simd::prelude::*;
 
 /// Slope in opacity per bin above which the rounding of a position, at most 2^-14 of a bin, would be visible.
 const STEEPEST: f64 = 8.0;
+
+/// Units of area in a bin of opacity 1: as many as a sum over all bins has room for beside a bit.
+const UNITS: f32 = 1e6;
+
+/// Positions count as at most this far from the bins, so that no difference of positions overflows.
+const FARTHEST: f32 = 1e9;
 
 /// See the module.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,16 +30,30 @@ pub(super) struct OpacityTable {
     splits: Vec<f32>,
     /// Two lines per bin, each as the opacity where it begins (the bin's lower end or the split) and its rise per bin.
     lines: Vec<f32>,
+    /// The integral of the opacity up to where each line begins, in [`UNITS`] per bin. Whole numbers, summed line by line:
+    /// the difference of two is that of the lines between, to the last bit, whatever an edit changes elsewhere. Twice
+    /// that, plus 1 in bins of more than one line, which spares most look-ups the split.
+    areas: Vec<i32>,
+    /// Position and opacity of the points, for rough bins.
+    knots: Vec<[f64; 2]>,
     any_rough: bool,
 }
 
 impl OpacityTable {
     /// The table of points in ascending order, at least one.
     pub(super) fn new(points: &[Point], bins: ValueBins) -> Self {
-        let mut table = Self { bins, splits: Vec::new(), lines: Vec::new(), any_rough: false };
         // Of several points at one position, the last holds from there on.
         let knots: Vec<[f64; 2]> =
             points.iter().map(|p| [bins.position_beyond(p.value), f64::from(p.optics.opacity)]).collect();
+        let mut table = Self {
+            bins,
+            splits: Vec::new(),
+            lines: Vec::new(),
+            areas: Vec::new(),
+            knots: Vec::new(),
+            any_rough: false,
+        };
+        let mut area = 0;
         // The line after a knot, as one that begins at a position.
         let line = |after: usize, position: f64| -> [f64; 2] {
             let ([x, o], next) = (knots[after], knots.get(after + 1));
@@ -63,7 +86,21 @@ impl OpacityTable {
             table.splits.push(if rough { f32::NAN } else { cast::single(split) });
             table.lines.extend([below, above].as_flattened().iter().map(|&x| cast::single(x)));
             table.any_rough |= rough;
+            let whole = |area: f64| cast::round_i32(area * f64::from(UNITS));
+            let of_line =
+                |[start, slope]: [f64; 2], length: f64| whole(length * (start + 0.5 * slope * length));
+            let shares = if rough {
+                // Without room between two bins there are no positions to integrate over.
+                [if bins.are_distinct() { whole(area_between(&knots, [lower, lower + 1.0])) } else { 0 }, 0]
+            } else {
+                let split = split.min(1.0);
+                [of_line(below, split), of_line(above, 1.0 - split)]
+            };
+            let has_split = i32::from(rough || split <= 1.0);
+            table.areas.extend([2 * area + has_split, 2 * (area + shares[0])]);
+            area += shares[0] + shares[1];
         }
+        table.knots = knots;
         table
     }
 
@@ -73,14 +110,20 @@ impl OpacityTable {
     }
 
     /// Whether look-ups in a bin differ in any bit from those of another table over the same bins, or only one of the
-    /// two evaluates the function there.
+    /// two evaluates the function there, or the area of the bin differs.
     pub(super) fn differs(&self, other: &Self, bin: usize) -> bool {
         let row = |table: &Self| {
             let split = table.splits[bin];
             let lines = [0, 1, 2, 3].map(|i| table.lines[4 * bin + i].to_bits());
             (!split.is_nan()).then_some((split.to_bits(), lines))
         };
-        row(self) != row(other)
+        row(self) != row(other) || self.area(bin) != other.area(bin)
+    }
+
+    /// The area of a bin, up to where its second line begins and in all.
+    fn area(&self, bin: usize) -> [Option<i32>; 2] {
+        let up_to = |line: usize| self.areas.get(line).map(|area| area >> 1);
+        [1, 2].map(|after| Some(up_to(2 * bin + after)? - self.areas[2 * bin] / 2))
     }
 
     /// Whether two values, and all values between them, have the same position in the table.
@@ -101,6 +144,83 @@ impl OpacityTable {
         }
         let (line, along) = if within >= split { (4 * bin + 2, within - split) } else { (4 * bin, within) };
         Some((self.lines[line] + self.lines[line + 1] * along).clamp(0.0, 1.0))
+    }
+
+    /// A value with its opacity and the integral up to it; `exact` gives the opacity in rough bins.
+    #[inline]
+    pub(super) fn read(&self, value: f32, exact: impl Fn(f32) -> f32) -> OpacityRead {
+        let [half_first, per_half] = self.bins.numbers();
+        let position = ((value * 0.5 - half_first) * per_half + 1.0).max(-FARTHEST);
+        let position = position.min(FARTHEST);
+        let within_bins = self.bins.position(value);
+        let bin = cast::index(within_bins);
+        let split = self.splits[bin];
+        if split.is_nan() {
+            let (opacity, part) = (exact(value), self.rough_part(bin, position));
+            return OpacityRead { position, opacity, area: self.areas[2 * bin] >> 1, part };
+        }
+        let within = within_bins - bin as f32;
+        let (line, along) = if within >= split { (2 * bin + 1, within - split) } else { (2 * bin, within) };
+        let [start, slope] = [self.lines[2 * line], self.lines[2 * line + 1]];
+        let opacity = (start + slope * along).clamp(0.0, 1.0);
+        let part = along * (start + slope * (0.5 * along)) + opacity * (position - within_bins);
+        OpacityRead { position, opacity, area: self.areas[line] >> 1, part }
+    }
+
+    /// The integral from where a rough bin begins.
+    #[cold]
+    fn rough_part(&self, bin: usize, position: f32) -> f32 {
+        let [from, to] = [bin as f64, f64::from(position)];
+        let area = if to < from {
+            -area_between(&self.knots, [to, from])
+        } else {
+            area_between(&self.knots, [from, to])
+        };
+        cast::single(area)
+    }
+
+    /// [`Self::read`] of a value per lane.
+    #[inline(always)]
+    pub(super) fn read_lanes<S: Lanes>(
+        &self,
+        simd: S,
+        values: S::f32s,
+        exact: impl Fn(f32) -> f32,
+    ) -> OpacityLanes<S> {
+        let top = S::f32s::splat(simd, (ValueBins::COUNT - 1) as f32);
+        let [half_first, per_half] = self.bins.numbers();
+        // Without fused operations, so that a value falls on the same side of a jump as in `read`.
+        let position: S::f32s = ((values * 0.5 - half_first) * per_half + 1.0).max(-FARTHEST).min(FARTHEST);
+        let within_bins: S::f32s = position.max(0.0).min(top);
+        let bin: S::i32s = within_bins.to_int();
+        let within = within_bins - bin.to_float::<S::f32s>();
+        let bin: S::u32s = bin.bitcast();
+        let (mut line, mut along) = (bin << 1, within);
+        let mut area: S::i32s = simd.words(&self.areas, line).bitcast();
+        let mut split = S::f32s::splat(simd, 2.0);
+        let is_split = (area & 1).simd_gt(S::i32s::splat(simd, 0));
+        if is_split.any_true() {
+            split = is_split.select(simd.numbers(&self.splits, bin), split);
+            let above = within.simd_ge(split);
+            line = above.select(line + 1, line);
+            along = above.select(within - split, within);
+            area = simd.words(&self.areas, line).bitcast();
+        }
+        let start = simd.numbers(&self.lines, line << 1);
+        let slope = simd.numbers(&self.lines, (line << 1) + 1);
+        let opacity = (start + slope * along).max(0.0).min(1.0);
+        let part = along * (start + slope * (along * 0.5)) + opacity * (position - within_bins);
+        let mut read: OpacityLanes<S> = OpacityLanes { position, opacity, area: area >> 1, part };
+        if self.any_rough && split.is_nan().any_true() {
+            for lane in 0..S::WIDTH {
+                if split.as_slice()[lane].is_nan() {
+                    let bin = bin.as_slice()[lane] as usize;
+                    read.opacity.as_mut_slice()[lane] = exact(values.as_slice()[lane]);
+                    read.part.as_mut_slice()[lane] = self.rough_part(bin, position.as_slice()[lane]);
+                }
+            }
+        }
+        read
     }
 
     /// Opacity at a value per lane; `exact` gives it in rough bins.
@@ -134,6 +254,32 @@ impl OpacityTable {
         }
         opacities
     }
+}
+
+/// The integral of the piecewise linear function through knots, constant beyond their ends, between two positions that ascend.
+fn area_between(knots: &[[f64; 2]], [from, to]: [f64; 2]) -> f64 {
+    let opacity = |position: f64| -> f64 {
+        let after = knots.partition_point(|k| k[0] <= position);
+        match (after.checked_sub(1).map(|i| knots[i]), knots.get(after)) {
+            (Some([x, o]), Some(&[y, p])) => o + (p - o) * (position - x) / (y - x),
+            (Some([_, o]), None) | (None, Some(&[_, o])) => o,
+            (None, None) => 0.0,
+        }
+    };
+    let inside = knots.iter().copied().filter(|k| from < k[0] && k[0] < to);
+    // The end itself, should a jump be there, as it is just below it.
+    let before = knots.partition_point(|k| k[0] < to);
+    let at_end = match (before.checked_sub(1).map(|i| knots[i]), knots.get(before)) {
+        (Some([x, o]), Some(&[y, p])) => o + (p - o) * (to - x) / (y - x),
+        _ => opacity(to),
+    };
+    let mut area = 0.0;
+    let mut last = [from, opacity(from)];
+    for knot in inside.chain([[to, at_end]]) {
+        area += 0.5 * (knot[0] - last[0]) * (knot[1] + last[1]);
+        last = knot;
+    }
+    area
 }
 
 #[cfg(test)]

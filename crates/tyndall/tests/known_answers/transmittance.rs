@@ -136,7 +136,7 @@ fn marched_distances_have_the_density_that_they_report() {
     let borders: Vec<f32> = (0..=14_u8).map(|k| (f32::from(k) * step).min(track.length())).collect();
     let mut depths = vec![0.0_f64];
     for pair in borders.windows(2) {
-        let sigma_t = medium.sigma_t(track.at(0.5 * (pair[0] + pair[1])));
+        let sigma_t = medium.mean_sigma_t([track.at(pair[0]), track.at(pair[1])]);
         depths.push(depths[depths.len() - 1] + f64::from(sigma_t) * f64::from(pair[1] - pair[0]));
     }
     let through = (-depths[14]).exp();

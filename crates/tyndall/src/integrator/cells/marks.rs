@@ -123,17 +123,24 @@ impl ChangeMarks {
         }
     }
 
-    /// Whether a marked position may be within reach of a position in index space.
+    /// Whether a marked position may be within reach of the way between two positions in index space.
     #[inline]
-    pub fn near(&self, position: Vec3) -> bool {
+    pub fn near(&self, ends: [Vec3; 2]) -> bool {
         match &self.kind {
             MarkKind::Off => false,
             MarkKind::Cells { grid, near, .. } => {
-                is_set(near, grid.number(grid.cell(grid.to_metric(position))))
+                let [a, b] = ends.map(|position| grid.cell(grid.to_metric(position)));
+                let along = |axis: usize| a[axis].min(b[axis])..=a[axis].max(b[axis]);
+                let row = |y: usize, z: usize| along(0).any(|x| is_set(near, grid.number([x, y, z])));
+                along(2).any(|z| along(1).any(|y| row(y, z)))
             }
             MarkKind::Axes { grid, axes } => {
-                let masks = grid.axis_reach(grid.to_metric(position));
-                axes.iter().zip(masks).all(|(axis, mask)| axis.load(Ordering::Relaxed) & mask != 0)
+                let [a, b] = ends.map(|position| grid.axis_reach(grid.to_metric(position)));
+                let mask = |axis: usize| {
+                    let both = a[axis] | b[axis];
+                    u64::MAX << both.trailing_zeros() & u64::MAX >> both.leading_zeros()
+                };
+                (0..3).all(|axis| axes[axis].load(Ordering::Relaxed) & mask(axis) != 0)
             }
         }
     }

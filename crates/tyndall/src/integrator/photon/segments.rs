@@ -225,12 +225,12 @@ fn forget_near(view: &View, pixel: [u32; 2], positions: &ChangeMarks, segments: 
         if cell.most <= 0.0 || !positions.near_cell(cell.cell) {
             continue;
         }
-        // One extra step on either side, since the border is subject to rounding.
-        let first = cast::truncate(cell.start / view.step - 1.5).max(0);
-        let last = cast::truncate(cell.end / view.step + 0.5).min(count - 1);
+        // All steps that reach into the cell; one extra on either side, since the border is subject to rounding.
+        let first = cast::truncate(cell.start / view.step - 1.0).max(0);
+        let last = cast::truncate(cell.end / view.step + 1.0).min(count - 1);
         for k in first..=last {
             let segment = &mut segments[segment_of(k, segments.len(), count)];
-            if segment.is_known() && positions.near(track.at(track.midpoint(k, view.step))) {
+            if segment.is_known() && positions.near(track.step_ends(k, view.step).map(|t| track.at(t))) {
                 *segment = Segment::UNKNOWN;
             }
         }

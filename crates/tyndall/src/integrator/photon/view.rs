@@ -4,7 +4,7 @@ use super::gather::Gathering;
 use super::map::PhotonMap;
 use crate::integrator::view_march::{Coverage, Shader, composite};
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::{MarchNotes, PacketMarch, PacketSample, Track};
+use crate::medium::{MarchNotes, PacketMarch, PacketSample, Sample, Track};
 use crate::scene::Scene;
 use crate::simd::{Lanes, MOST_LANES};
 use crate::transfer::{HistoryGroups, Historygram};
@@ -108,7 +108,7 @@ impl View<'_> {
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
         let Some(map) = self.map else { return Rgb::BLACK };
-        let ViewSample { position, value, width, w_out, lane } = *sample;
+        let ViewSample { at: Sample { position, value }, width, w_out, lane } = *sample;
         let medium = &*self.scene.medium;
         let optics = medium.transfer().optics(value);
         let event = medium.event(position, &optics);
@@ -141,7 +141,7 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
                 // Lanes without a sample may have any value.
                 let covered = covered.as_slice()[lane];
                 if covered > 0.0 {
-                    *radiance += medium.transfer().emitted(sample.value.as_slice()[lane]) * covered;
+                    *radiance += medium.transfer().emitted(sample.seen(medium, lane).value) * covered;
                 }
             }
         }
@@ -155,11 +155,8 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
         for lane in 0..S::WIDTH {
             let weight = weight.as_slice()[lane];
             if weight > 0.0 {
-                let [x, y, z] = sample.position;
-                let position = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
                 let here = ViewSample {
-                    position,
-                    value: sample.value.as_slice()[lane],
+                    at: sample.seen(medium, lane),
                     width: width.as_slice()[lane],
                     w_out: -self.rays[lane].direction,
                     lane,
@@ -174,9 +171,7 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
 
 /// A sample of one ray.
 struct ViewSample {
-    /// Index space.
-    position: Vec3,
-    value: f32,
+    at: Sample,
     /// Length of the ray that it represents, world units.
     width: f32,
     w_out: Vec3,
@@ -196,13 +191,15 @@ impl<S: Lanes> MarchNotes<S> for Notes<'_> {
     const EACH_CELL: bool = true;
 
     #[inline(always)]
-    fn values(&mut self, simd: S, lanes: S::mask32s, values: S::f32s) {
-        let bin = self.bins.bin_lanes(simd, values);
+    fn between(&mut self, simd: S, lanes: S::mask32s, [from, to]: [S::f32s; 2]) {
+        let [from, to] = [self.bins.bin_lanes(simd, from), self.bins.bin_lanes(simd, to)];
+        let (first, last) = (from.min(to), from.max(to));
         let taken = lanes.select(S::i32s::splat(simd, 1), S::i32s::splat(simd, 0));
         for lane in 0..S::WIDTH {
-            let group = self.groups.of_bins()[bin.as_slice()[lane].cast_unsigned() as usize];
-            let taken = u128::from(taken.as_slice()[lane].cast_unsigned());
-            self.read[lane] |= Historygram::from_bits(taken << group);
+            if taken.as_slice()[lane] > 0 {
+                let bin = |bins: &S::i32s| bins.as_slice()[lane].cast_unsigned() as usize;
+                self.read[lane] |= self.groups.between(bin(&first), bin(&last));
+            }
         }
     }
 

@@ -8,7 +8,7 @@ use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::Stop;
 use crate::integrator::view_march::{Coverage, OPAQUE, Shader, composite};
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::{PacketMarch, PacketSample, Track};
+use crate::medium::{PacketMarch, PacketSample, Sample, Track, TrackStart};
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes, Level, MOST_LANES};
 use fearless_simd::prelude::*;
@@ -102,6 +102,7 @@ impl RayMarch {
         let optics = medium.transfer().optics(at.value);
         let event = medium.event(at.position, &optics);
         let here = medium.volume().grid().index_to_world(at.position);
+        let start = TrackStart::new(simd, medium, at.value);
         let lights = scene.lights.lights();
         while let Some(light) = lights.get(lit.light) {
             let points = if light.can_be_passed() { &self.light_points[..] } else { &[[0.5; 2]] };
@@ -114,7 +115,7 @@ impl RayMarch {
                     continue;
                 }
                 let track = medium.track(&Ray::new(here, sample.direction), sample.distance);
-                let thickness = medium.thickness_lanes(simd, &track, self.step, -OPAQUE.ln());
+                let thickness = medium.thickness_lanes(simd, &track, Some(&start), self.step, -OPAQUE.ln());
                 lit.sum += unshadowed * (-thickness).exp();
                 if stop.reached() {
                     return None;
@@ -178,9 +179,7 @@ impl<S: Lanes> Shader<S, ()> for DirectShader<'_, '_> {
                     packet.shaded = lane;
                     return false;
                 }
-                let [x, y, z] = sample.position;
-                let position = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
-                let value = sample.value.as_slice()[lane];
+                let Sample { position, value } = sample.seen(&scene.medium, lane);
                 let at = ShadedPosition { position, value, w_out: -packet.rays[lane].direction };
                 let Some(source) = raymarch.source(simd, scene, &at, &mut packet.lit, stop) else {
                     packet.shaded = lane;
@@ -195,8 +194,11 @@ impl<S: Lanes> Shader<S, ()> for DirectShader<'_, '_> {
             }
             let glowing = if transfer.emits() { packet.count } else { 0 };
             for lane in 0..glowing {
-                let emitted = transfer.emitted(sample.value.as_slice()[lane]);
-                packet.radiance[lane] += emitted * covered.as_slice()[lane];
+                let covered = covered.as_slice()[lane];
+                if covered > 0.0 {
+                    let value = sample.seen(&scene.medium, lane).value;
+                    packet.radiance[lane] += transfer.emitted(value) * covered;
+                }
             }
             *moved = true;
         }
