@@ -12,7 +12,7 @@ use tyndall_live::document::apply;
 
 /// Largest difference of a picture's light, and half that of the median of its blocks, where matter is smooth from texel to texel.
 const SMOOTH: f64 = 0.01;
-/// The same where matter begins from one voxel to the next, and light falls to three quarters from texel to texel.
+/// The same where matter begins from one voxel to the next, and light falls to three quarters within half a voxel.
 const STEEP: f64 = 0.015;
 
 /// Blocks with less light than this, relative to the brightest, are not compared: they show the object's edge.
@@ -312,7 +312,7 @@ fn every_way_to_scatter() {
         ] {
             let limit = match (name, is_soft) {
                 (_, true) => SMOOTH,
-                // Nearly all light is lost within two texels.
+                // Nearly two thirds of the light are lost within two texels.
                 ("dense", false) => 0.12,
                 (_, false) => STEEP,
             };
@@ -334,7 +334,7 @@ fn few_voxels() {
             ("sky", vec![sky()]),
             ("point", vec![point(beside, 3000.0)]),
         ] {
-            // Between the faces are one to three texels.
+            // Between the faces are few texels.
             cases.compare(&format!("{dims:?}, {name}"), &file, &look(true, &lights), 0.05);
         }
     }

@@ -234,3 +234,53 @@ fn values_between_the_ends_of_steps() {
     value["render"]["max_scatter"] = 0.into();
     assert_each_changes_some(&mut value, points, [0.5, 0.6, 0.5, 0.4]);
 }
+
+/// A ball that scatters in shells thinner than a gather.
+fn shells(value: &mut Value) {
+    *value = base("photon");
+    value["volume"] = json!({ "procedural": { "kind": "sphere", "size": [20, 20, 20] } });
+    value["film"]["size"] = json!([32, 32]);
+    value["medium"]["density"] = 100.into();
+    value["render"]["photon"] = json!({ "photons": 60_000, "segments": 20 });
+}
+
+/// Gathers look for matter in all values that spread about them, also in those that no step of a view ray meets.
+#[test]
+fn values_that_spread_about_gathers() {
+    let mut value = Value::Null;
+    shells(&mut value);
+    let point = |value: f64, opacity: f64| json!({ "value": value, "opacity": opacity });
+    // Hidden in the ball, behind what is opaque.
+    let points = |opacity: f64| {
+        json!([
+            point(0.3, 0.0),
+            point(0.31, 0.2),
+            point(0.32, 0.0),
+            point(0.42, 0.0),
+            point(0.425, opacity),
+            point(0.43, 0.0)
+        ])
+    };
+    assert_each_changes_some(&mut value, points, [0.5, 0.6, 0.0, 0.3]);
+}
+
+/// A function with narrow peaks has gathers look for matter in another way, even far from the peak.
+#[test]
+fn peaks_that_come_and_go() {
+    let mut value = Value::Null;
+    shells(&mut value);
+    let point = |value: f64, opacity: f64| json!({ "value": value, "opacity": opacity });
+    let steps = [
+        json!([point(0.2, 0.0), point(0.6, 0.3)]),
+        json!([point(0.2, 0.0), point(0.6, 0.3), point(5.0, 0.3), point(5.001, 0.4), point(5.002, 0.3)]),
+    ];
+    value["transfer_function"]["points"] = steps[0].clone();
+    let mut live = Session::new(scene(&value), THREADS.clone());
+    refined(&mut live, 1);
+    for round in 1..4 {
+        value["transfer_function"]["points"] = steps[round % 2].clone();
+        live.set_scene(scene(&value));
+        let found = refined(&mut live, 1);
+        assert!(found == refined(&mut Session::new(scene(&value), THREADS.clone()), 1), "round {round}");
+    }
+}

@@ -69,7 +69,7 @@ fn edits(value: &Value) -> Vec<(&'static str, bool, Value)> {
         ("size", true, json!({ "film": { "size": [23, 16] } })),
         ("background", true, json!({ "film": { "background": [0.2, 0, 0] } })),
         ("interpolation", false, json!({ "volume": { "interpolation": "nearest" } })),
-        ("cells", false, json!({ "medium": { "majorant_cell": 5 } })),
+        ("cells", true, json!({ "medium": { "majorant_cell": 5 } })),
         ("light points", false, json!({ "render": { "raymarch": { "light_samples": 9 } } })),
         ("exact shadows", true, json!({ "render": { "raymarch": { "shadows": "exact" } } })),
         ("no scattering", true, json!({ "render": { "max_scatter": 0 } })),

@@ -2,18 +2,19 @@
 //!
 //! Step `k` covers `[k step, (k + 1) step]`, the last one what is left. Its extinction is the mean over all values
 //! between those at its ends, as if values changed linearly along it \[Engel01\]; with interpolation `nearest` it is that
-//! of the first value up to where the value changes, and of the second from there. The grid does not depend on the
+//! of the first value up to where the value changes, and of the second from there (in flights, the plain mean of the two). The grid does not depend on the
 //! transfer function. Steps between two empty cells are skipped, which changes no bit: such cells touch, so that all
 //! values between belong to empty cells.
 
-use super::between::StepEnds;
 use super::march_notes::MarchNotes;
 use super::skip::{LaneCells, Skip};
+use super::step_ends::{Site, StepEnds};
 use super::{Medium, Track};
-use crate::math::{Vec3, cast};
-use crate::simd::{Kernel, Lanes, Level, MOST_LANES};
+use crate::math::{Rgb, Vec3, cast};
+use crate::simd::{Kernel, Lanes, Level, MOST_LANES, log2_unfused, one_minus_exp};
 use crate::transfer::OpacityLanes;
 use fearless_simd::prelude::*;
+use std::f32::consts::LN_2;
 
 /// The steps of one track.
 #[derive(Clone, Copy, Debug, Default)]
@@ -57,45 +58,105 @@ pub(crate) struct PacketSample<S: Lanes> {
     from: [S::f32s; 3],
     to: [S::f32s; 3],
     ends: StepEnds<S>,
-    /// The share of the visible matter of the step that is before the sample.
+    /// The share of what is visible of the step that lies in front of its site.
     within: S::f32s,
 }
 
-/// A position in a step.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Sample {
+/// Where steps are seen.
+pub(crate) struct SeenLanes<S: Lanes> {
     /// In index space.
-    pub position: Vec3,
-    /// Data value.
-    pub value: f32,
+    pub position: [S::f32s; 3],
+    /// Data values.
+    pub value: S::f32s,
+    /// The share of what is visible of the step that each stands for; 0 in lanes without a position.
+    pub weight: S::f32s,
 }
 
-impl<S: Lanes> PacketSample<S> {
-    /// Where a lane's step is seen: between what is visible of it before and behind. In constant thin matter this is its
-    /// middle.
+impl<S: Lanes> SeenLanes<S> {
+    /// A lane's position in index space.
     #[inline(always)]
-    pub fn seen(&self, medium: &Medium, lane: usize) -> Sample {
-        let (thickness, within) = (self.thickness.as_slice()[lane], self.within.as_slice()[lane]);
-        // Half of what is visible, not half of what there is; both are the same where there is little.
-        let share = if thickness > THIN {
-            -(-within * (1.0 - (-thickness).exp())).ln_1p() / thickness
-        } else {
-            within
-        };
-        let found = self.ends.place(medium, lane, share);
-        let along = |axis: usize| {
-            let (from, to) = (self.from[axis].as_slice()[lane], self.to[axis].as_slice()[lane]);
-            (to - from).mul_add(found.share, from)
-        };
-        Sample { position: Vec3::new(along(0), along(1), along(2)), value: found.value }
+    pub fn position(&self, lane: usize) -> Vec3 {
+        let [x, y, z] = &self.position;
+        Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane])
     }
 }
 
-/// Thickness up to which a step hides nothing of itself.
+impl<S: Lanes> PacketSample<S> {
+    /// How many sites at most a step is seen at.
+    pub const SITES: usize = 2;
+
+    /// Where some lanes' steps are seen, at the first or second of their sites; `None` if none of them has that site. Steps
+    /// have two where they are thick and hold a peak, which light may reach from either side: sites stand for equal shares of what is
+    /// visible of a step. In constant thin matter the only site is the step's middle.
+    #[inline(always)]
+    pub fn seen(&self, simd: S, medium: &Medium, lanes: S::mask32s, site: usize) -> Option<SeenLanes<S>> {
+        let two = self.ends.is_narrow() & self.thickness.simd_gt(S::f32s::splat(simd, THICK));
+        let lanes = if site == 0 { lanes } else { lanes & two };
+        if !lanes.any_true() {
+            return None;
+        }
+        let one = S::f32s::splat(simd, 1.0);
+        let weight = two.select(one * 0.5, one);
+        let within = (self.within + site as f32) * weight;
+        Some(self.seen_within(simd, medium, lanes, within, weight))
+    }
+
+    /// Where some lanes' steps are seen, each at one site only.
+    #[inline(always)]
+    pub fn seen_once(&self, simd: S, medium: &Medium, lanes: S::mask32s) -> SeenLanes<S> {
+        self.seen_within(simd, medium, lanes, self.within, S::f32s::splat(simd, 1.0))
+    }
+
+    /// Adds to the radiance of each lane what its step emits, times `covered`; lanes that cover nothing are passed over.
+    #[inline(always)]
+    pub fn add_emitted(&self, simd: S, medium: &Medium, covered: S::f32s, radiance: &mut [Rgb; MOST_LANES]) {
+        let lanes = covered.simd_gt(S::f32s::splat(simd, 0.0));
+        for site in 0..Self::SITES {
+            let Some(seen) = self.seen(simd, medium, lanes, site) else { break };
+            let covered = covered * seen.weight;
+            for (lane, radiance) in radiance.iter_mut().enumerate().take(S::WIDTH) {
+                let covered = covered.as_slice()[lane];
+                if covered > 0.0 {
+                    *radiance += medium.transfer.emitted(seen.value.as_slice()[lane]) * covered;
+                }
+            }
+        }
+    }
+
+    /// Where the share `within` of what is visible of a step lies in front.
+    #[inline(always)]
+    fn seen_within(
+        &self,
+        simd: S,
+        medium: &Medium,
+        lanes: S::mask32s,
+        within: S::f32s,
+        weight: S::f32s,
+    ) -> SeenLanes<S> {
+        let mut share = within;
+        // A share of what is visible, not of what there is; both are the same where there is little.
+        let thick = self.thickness.simd_gt(S::f32s::splat(simd, THIN));
+        if thick.any_true() {
+            let behind = -within * one_minus_exp(simd, self.thickness) + 1.0;
+            let depth = log2_unfused(simd, behind) * -LN_2;
+            share = thick.select(depth / self.thickness, share);
+        }
+        let Site { share, value } = self.ends.site(simd, medium, share, lanes);
+        let ([ox, oy, oz], [tx, ty, tz]) = (self.from, self.to);
+        let position =
+            [(tx - ox).mul_add(share, ox), (ty - oy).mul_add(share, oy), (tz - oz).mul_add(share, oz)];
+        SeenLanes { position, value, weight: lanes.select(weight, S::f32s::splat(simd, 0.0)) }
+    }
+}
+
+/// Optical thickness up to which a step hides nothing of itself.
 const THIN: f32 = 1e-3;
+/// Optical thickness above which the front and the back of a step are lit differently.
+const THICK: f32 = 0.5;
 
 impl Medium {
-    /// Optical thickness along a track by steps of `step` world units; stops once it exceeds `enough`.
+    /// Optical thickness along a track by steps of `step` world units; it may end once it exceeds `enough`, at a
+    /// step that depends on the level.
     #[must_use]
     pub fn optical_thickness(&self, level: Level, track: &Track, step: f32, enough: f32) -> f32 {
         struct Thickness<'a>(&'a Medium, &'a Track, f32, f32);
@@ -308,16 +369,14 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
             let value = medium.volume.value_lanes(simd, to);
             let opacity = medium.transfer.read_lanes(simd, value);
             let (values, opacities) = ([self.value, value], [self.opacity, opacity]);
-            notes.between(simd, here, values);
-            let mut ends = StepEnds::new(simd, values, opacities);
-            if !medium.interpolates {
-                let from = at::<S>(self.origin, self.direction, start);
-                ends.find_border(simd, medium, [from, to], here);
-            }
+            let from = at::<S>(self.origin, self.direction, start);
+            let mut ends = StepEnds::new(simd, medium.interpolates, values, opacities);
+            let inside = here & if medium.interpolates { ends.vary() } else { ends.differ() };
+            ends.refine(simd, medium, [from, to], inside);
+            notes.between(simd, here, ends.range());
             (self.value, self.opacity, self.known) = (value, opacity, here);
-            let thickness = here.select(ends.mean(simd, medium) * width * medium.density, zero);
+            let thickness = here.select(ends.mean * width * medium.density, zero);
             if thickness.simd_gt(zero).any_true() {
-                let from = at::<S>(self.origin, self.direction, start);
                 let t = start + width * 0.5;
                 return Some(PacketSample { t, width, thickness, from, to, ends, within: self.within });
             }
@@ -372,6 +431,9 @@ impl Track {
     }
 }
 
+/// Thickness that matters little on the way from a light.
+const SLIGHT: f32 = 0.05;
+
 /// Ends of one track's steps, gathered until they fill the lanes, the nearest last: then each lane's next end is in the
 /// lane before it.
 struct Along<'a, S: Lanes> {
@@ -384,6 +446,8 @@ struct Along<'a, S: Lanes> {
     pending: [i32; MOST_LANES],
     /// 1 where the step before an end is one of those to be added, 0 where it is not.
     joined: [f32; MOST_LANES],
+    /// Mean opacity up to which values inside a step are not read.
+    slight: f32,
     count: usize,
     /// The last end that was added.
     last: i32,
@@ -414,6 +478,7 @@ impl<'a, S: Lanes> Along<'a, S> {
             step,
             pending: [0; MOST_LANES],
             joined: [0.0; MOST_LANES],
+            slight: SLIGHT / (step * medium.density),
             count: 0,
             // No end has been read if the first value is not known.
             last: if first.is_some() { 0 } else { -1 },
@@ -455,15 +520,17 @@ impl<'a, S: Lanes> Along<'a, S> {
         let position = self.track.lanes(simd, t);
         let value = medium.volume.value_lanes(simd, position);
         let opacity = medium.transfer.read_lanes(simd, value);
-        let before = [value.slide::<1>(self.value), value];
-        let mut ends = StepEnds::new(simd, before, [opacity.successors(self.opacity), opacity]);
+        let values = [value.slide::<1>(self.value), value];
+        let opacities = [opacity.successors(self.opacity), opacity];
         let joined = S::f32s::from_slice(simd, &self.joined[..S::WIDTH]);
-        if !medium.interpolates {
+        let lanes = joined.simd_gt(S::f32s::splat(simd, 0.0));
+        let mut ends = StepEnds::new(simd, medium.interpolates, values, opacities);
+        let varying = lanes & ends.vary_above(self.slight);
+        if varying.any_true() {
             let from = self.track.lanes(simd, t - width);
-            let lanes = joined.simd_gt(S::f32s::splat(simd, 0.0));
-            ends.find_border(simd, medium, [from, position], lanes);
+            ends.refine(simd, medium, [from, position], varying);
         }
-        self.thickness += ends.mean(simd, medium) * width * joined;
+        self.thickness += ends.mean * width * joined;
         (self.value, self.opacity) = (value, opacity);
         self.count = 0;
         self.joined = [0.0; MOST_LANES];

@@ -13,6 +13,9 @@ pub(crate) trait MarchNotes<S: Lanes> {
     /// Values that one lane reads around its sample.
     fn values_about(&mut self, simd: S, lane: usize, read: S::mask32s, values: S::f32s);
 
+    /// All values between two, in those of the lanes `read`, that one lane reads around its sample.
+    fn values_between_about(&mut self, simd: S, lane: usize, read: S::mask32s, ends: [S::f32s; 2]);
+
     /// Numbers of the empty cells that some lanes skip, x fastest.
     fn cells(&mut self, simd: S, lanes: S::mask32s, cells: S::u32s);
 }
@@ -26,6 +29,9 @@ impl<S: Lanes> MarchNotes<S> for () {
 
     #[inline(always)]
     fn values_about(&mut self, _: S, _: usize, _: S::mask32s, _: S::f32s) {}
+
+    #[inline(always)]
+    fn values_between_about(&mut self, _: S, _: usize, _: S::mask32s, _: [S::f32s; 2]) {}
 
     #[inline(always)]
     fn cells(&mut self, _: S, _: S::mask32s, _: S::u32s) {}

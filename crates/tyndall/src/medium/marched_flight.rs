@@ -64,12 +64,6 @@ impl Medium {
     /// between, or of both values where voxels are not interpolated.
     #[must_use]
     pub fn mean_sigma_t(&self, ends: [Vec3; 2]) -> f32 {
-        let values = ends.map(|p| self.volume.value(p));
-        let opacity = if self.interpolates {
-            self.transfer.mean_opacity(values)
-        } else {
-            0.5 * (self.transfer.opacity(values[0]) + self.transfer.opacity(values[1]))
-        };
-        self.density * opacity
+        self.density * self.mean_opacity(ends)
     }
 }

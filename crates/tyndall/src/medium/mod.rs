@@ -2,7 +2,6 @@
 //!
 //! Extinction is scalar, `sigma_t(v) = density * opacity(v)` per world unit; colour enters as albedo.
 
-mod between;
 mod clip;
 mod emptiness;
 mod free_flight;
@@ -11,13 +10,15 @@ mod march;
 mod march_notes;
 mod marched_flight;
 mod skip;
+mod spread;
+mod step_ends;
 
 pub(crate) use clip::HalfSpace;
 pub use clip::{Clip, ClipShape};
 pub use free_flight::Collision;
 pub(crate) use free_flight::FlightNotes;
 pub use majorants::{CellStretch, CellWalk, MajorantGrid};
-pub(crate) use march::{PacketMarch, PacketSample, Sample, TrackStart};
+pub(crate) use march::{PacketMarch, PacketSample, SeenLanes, TrackStart};
 pub(crate) use march_notes::MarchNotes;
 pub use marched_flight::MarchedCollision;
 

@@ -4,18 +4,18 @@
 //! the later one holds from there on. All optics are evaluated by segment, which a small index finds in
 //! constant time; opacity and emission, which are read most, also come from tables that agree up to rounding.
 
-mod between;
 mod difference;
 mod glow;
 mod historygram;
 mod optics;
+mod pre_integrated;
 mod presets;
 mod table;
 
-pub(crate) use between::{Between, OpacityLanes};
 pub use difference::{BinSet, TransferDifference};
 pub use historygram::{Grouping, HistoryGroups, Historygram};
 pub use optics::Optics;
+pub(crate) use pre_integrated::OpacityLanes;
 pub use presets::{PRESETS, Preset, PresetError};
 
 use crate::math::{Rgb, cast};
@@ -55,8 +55,26 @@ pub struct TransferFunction {
     segments: Vec<u32>,
     bins_per_value: f32,
     opacities: OpacityTable,
+    narrowest_peak: f32,
     /// `None` where nothing glows.
     glow: Option<GlowTable>,
+}
+
+/// See [`TransferFunction::narrowest_peak`].
+fn narrowest_peak(points: &[Point]) -> f32 {
+    let mut narrowest = f32::INFINITY;
+    let mut last_rise = None;
+    for pair in points.windows(2) {
+        let (from, to) = (pair[0].optics.opacity, pair[1].optics.opacity);
+        if to > from {
+            last_rise = Some(pair[0].value);
+        } else if to < from
+            && let Some(start) = last_rise.take()
+        {
+            narrowest = narrowest.min(pair[1].value - start);
+        }
+    }
+    narrowest
 }
 
 /// Bins of the segment index.
@@ -118,7 +136,8 @@ impl TransferFunction {
             .map(|after| cast::fit_u32(after.saturating_sub(1)))
             .collect();
         let opacities = OpacityTable::new(&points, bins);
-        let mut function = Self { points, segments, bins_per_value, opacities, glow: None };
+        let narrowest_peak = narrowest_peak(&points);
+        let mut function = Self { points, segments, bins_per_value, opacities, narrowest_peak, glow: None };
         if function.points.iter().any(|p| !p.optics.emission.is_black()) {
             function.glow = Some(GlowTable::new(&function.points, bins, |value| function.optics(value)));
         }
@@ -195,11 +214,16 @@ impl TransferFunction {
         from.mean(to)
     }
 
-    /// Where, on the way from one data value to another along which values change linearly, a share of the opacity has
-    /// been met.
-    pub(crate) fn between(&self, values: [f32; 2], share: f32) -> Between {
-        let read = |value: f32| self.opacities.read(value, |value| self.exact_opacity(value));
-        Between::of_share(values, share, read)
+    /// Whether two data values are so far apart that nothing lies between: an edge.
+    pub(crate) fn is_edge(&self, values: [f32; 2]) -> bool {
+        let [from, to] = values.map(|value| self.opacities.read(value, |value| self.exact_opacity(value)));
+        from.is_edge(to)
+    }
+
+    /// Width, in data values, of the narrowest stretch in which opacity rises and falls, from point to point; infinite if it does so
+    /// nowhere.
+    pub(crate) fn narrowest_peak(&self) -> f32 {
+        self.narrowest_peak
     }
 
     /// Smallest and largest opacity over data values `[lo, hi]`.

@@ -7,7 +7,7 @@
 //! Each line also keeps the integral of the opacity up to where it begins, for the mean opacity between two values.
 
 use super::Point;
-use super::between::{OpacityLanes, OpacityRead};
+use super::pre_integrated::{OpacityLanes, OpacityRead, UNITS_PER_BIN};
 use crate::math::cast;
 use crate::simd::Lanes;
 use crate::volume::ValueBins;
@@ -15,9 +15,6 @@ use fearless_simd::prelude::*;
 
 /// Slope in opacity per bin above which the rounding of a position, at most 2^-14 of a bin, would be visible.
 const STEEPEST: f64 = 8.0;
-
-/// Units of area in a bin of opacity 1: as many as a sum over all bins has room for beside a bit.
-const UNITS: f32 = 1e6;
 
 /// Positions count as at most this far from the bins, so that no difference of positions overflows.
 const FARTHEST: f32 = 1e9;
@@ -30,9 +27,9 @@ pub(super) struct OpacityTable {
     splits: Vec<f32>,
     /// Two lines per bin, each as the opacity where it begins (the bin's lower end or the split) and its rise per bin.
     lines: Vec<f32>,
-    /// The integral of the opacity up to where each line begins, in [`UNITS`] per bin. Whole numbers, summed line by line:
-    /// the difference of two is that of the lines between, to the last bit, whatever an edit changes elsewhere. Twice
-    /// that, plus 1 in bins of more than one line, which spares most look-ups the split.
+    /// Twice the integral of the opacity up to where each line begins, in [`UNITS_PER_BIN`]; the first line's is 1 more in bins that have
+    /// a split or are rough, which spares other look-ups the split. Whole numbers, summed line by line: the difference of two is that of
+    /// the lines between, to the last bit, whatever an edit changes elsewhere.
     areas: Vec<i32>,
     /// Position and opacity of the points, for rough bins.
     knots: Vec<[f64; 2]>,
@@ -86,7 +83,7 @@ impl OpacityTable {
             table.splits.push(if rough { f32::NAN } else { cast::single(split) });
             table.lines.extend([below, above].as_flattened().iter().map(|&x| cast::single(x)));
             table.any_rough |= rough;
-            let whole = |area: f64| cast::round_i32(area * f64::from(UNITS));
+            let whole = |area: f64| cast::round_i32(area * f64::from(UNITS_PER_BIN));
             let of_line =
                 |[start, slope]: [f64; 2], length: f64| whole(length * (start + 0.5 * slope * length));
             let shares = if rough {

@@ -1,7 +1,8 @@
 //! Which light paths, photons and segments remain valid after an edit.
 
+use super::gather::between_points;
 use super::stored::Photon;
-use super::{PhotonMapper, SegmentTile, marks_for, plan, step};
+use super::{PhotonMapper, SegmentTile, cells_for, marks_for, plan, step};
 use crate::integrator::cells::ChangeMarks;
 use crate::integrator::history::{MovedBounds, Touched};
 use crate::integrator::light_paths::{Chunk, LightPaths, PathSource, sources};
@@ -49,7 +50,13 @@ impl PhotonMapper {
         if difference.density.is_some() {
             self.map.discard();
         }
-        if difference.camera || difference.size || step_changed {
+        let peaks = |scene: &Scene| {
+            let edges = between_points(&cells_for(scene, &self.settings, self.settings.radius));
+            scene.medium.may_peak_within(edges.max_element())
+        };
+        // Gathers then look for matter in another way.
+        let peaks_changed = peaks(old) != peaks(new);
+        if difference.camera || difference.size || step_changed || peaks_changed {
             self.has_segments = false;
         }
         for tile in tiles.iter_mut().flatten() {

@@ -4,6 +4,7 @@ use super::kernel::{Ball, GatherRegion, Slice};
 use super::map::PhotonMap;
 use super::matter::Matter;
 use super::settings::Estimator;
+use crate::integrator::cells::CellGrid;
 use crate::math::{PackedDirection, Rgb, Vec3};
 use crate::medium::{MarchNotes, Medium};
 use crate::scattering::{Brdf, Event, Phase};
@@ -17,8 +18,12 @@ use std::ops::Range;
 pub(super) struct Gathering {
     /// Index space.
     pub position: Vec3,
-    /// Opacity there; positive up to rounding.
+    /// Opacity there, the largest within the spread of values; positive up to rounding.
     pub opacity: f32,
+    /// The mean within the spread of values.
+    pub mean: f32,
+    /// See [`PhotonMap::half_spread`].
+    pub half_spread: f32,
     pub event: Event,
     /// Towards the viewer.
     pub w_out: Vec3,
@@ -54,6 +59,13 @@ impl PhotonMap {
         }
     }
 
+    /// Half of the width over which values spread between the points that look for matter around a position, or 0 where opacity changes
+    /// so slowly with the value that points stand for what is between them.
+    pub fn half_spread(&self, medium: &Medium, position: Vec3) -> f32 {
+        let edges = between_points(&self.grid);
+        if medium.may_peak_within(edges.max_element()) { medium.half_spread(position, edges) } else { 0.0 }
+    }
+
     /// The estimate from the photons in a region.
     #[inline(always)]
     fn within<S: Lanes, R: GatherRegion>(
@@ -64,14 +76,14 @@ impl PhotonMap {
         mut kernel: R,
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
-        let (q, here) = (self.grid.to_metric(at.position), (at.position, at.opacity, at.lane));
+        let q = self.grid.to_metric(at.position);
         let index = self.grid.index_per_metric();
-        let mut matter = Matter::about(simd, medium, here, index, &kernel, notes);
+        let mut matter = Matter::about(simd, medium, at, index, &kernel, notes);
         // The radius in world units, divided by the mean free path.
-        let thickness = self.radius * medium.density() * at.opacity;
+        let thickness = self.radius * medium.density() * at.mean;
         if let Some((axis, share)) = flat_skin(matter.lean, kernel.radius(), thickness) {
             kernel = kernel.flattened(axis, share);
-            matter = Matter::about(simd, medium, here, index, &kernel, notes);
+            matter = Matter::about(simd, medium, at, index, &kernel, notes);
         }
         if matter.opacity <= 0.0 {
             return Rgb::BLACK;
@@ -135,6 +147,14 @@ impl PhotonMap {
         // Photons may be exactly at the position; a sphere must not be empty.
         nth.sqrt().max(1e-3)
     }
+}
+
+/// Distances in voxels, along each axis of index space, between the points that look for matter in a region.
+pub(super) fn between_points(grid: &CellGrid) -> Vec3 {
+    /// In radii: the edge of a cube of a seventeenth of a ball.
+    const EDGE: f32 = 0.63;
+    let rows = grid.index_per_metric().transpose();
+    Vec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length()) * EDGE
 }
 
 /// A pseudo-random number that depends on the position alone.

@@ -7,9 +7,13 @@
 //! moment, as in local regression at a boundary \[Fan92\]: with the moments `m0`, `m1`, `m2` of the extinction,
 //! `a = sum (1 - c x) flux / (m0 - c m1)`, `c = m2^-1 m1`.
 //!
+//! Where opacity peaks between the values at the points, each stands for the mean opacity of the values that spread around it, as
+//! far as they do around the position, from point to point.
+//!
 //! Matter denser than at the position counts as if it had the density at the position, and its photons are scaled down
 //! accordingly. Otherwise a dense neighbour that the points miss would light up all the thin matter around it.
 
+use super::gather::Gathering;
 use super::kernel::GatherRegion;
 use crate::math::{Mat3, Vec3};
 use crate::medium::{MarchNotes, Medium};
@@ -39,23 +43,23 @@ pub(super) struct Matter {
 }
 
 impl Matter {
-    /// About a position in index space with opacity `own`, which is positive; `to_index` transforms metric vectors to
-    /// index space.
+    /// About a gather; `to_index` transforms metric vectors to index space.
     #[inline(always)]
     pub fn about<S: Lanes>(
         simd: S,
         medium: &Medium,
-        (position, own, lane): (Vec3, f32, usize),
+        at: &Gathering,
         to_index: &Mat3,
         kernel: &impl GatherRegion,
         notes: &mut impl MarchNotes<S>,
     ) -> Self {
+        let Gathering { position, opacity, mean: own, half_spread, lane, .. } = *at;
         let zero = S::f32s::splat(simd, 0.0);
         let (mut sum, mut sx, mut sy, mut sz) = (zero, zero, zero, zero);
         let (mut xx, mut yy, mut zz) = (zero, zero, zero);
         let (mut xy, mut xz, mut yz) = (zero, zero, zero);
         let Mat3 { x_axis: i, y_axis: j, z_axis: k } = *to_index;
-        let most = S::f32s::splat(simd, own);
+        let most = S::f32s::splat(simd, opacity);
         let mut first = 0;
         while first < MOST_LANES {
             let [x, y, z] = kernel.points(simd, first);
@@ -66,9 +70,19 @@ impl Matter {
             ];
             let inside = medium.contains_lanes(simd, about);
             let value = medium.volume().value_lanes(simd, about);
-            notes.values_about(simd, lane, inside, value);
-            let opacity = medium.transfer().opacity_lanes(simd, value).min(most);
-            let opacity = inside.select(opacity, zero);
+            let opacity = if half_spread > 0.0 {
+                let ends = [value - half_spread, value + half_spread];
+                notes.values_between_about(simd, lane, inside, ends);
+                let [from, to] = [
+                    medium.transfer().read_lanes(simd, ends[0]),
+                    medium.transfer().read_lanes(simd, ends[1]),
+                ];
+                from.mean(simd, to)
+            } else {
+                notes.values_about(simd, lane, inside, value);
+                medium.transfer().opacity_lanes(simd, value)
+            };
+            let opacity = inside.select(opacity.min(most), zero);
             let (ox, oy, oz) = (opacity * x, opacity * y, opacity * z);
             (sum, sx, sy, sz) = (sum + opacity, sx + ox, sy + oy, sz + oz);
             (xx, yy, zz) = (ox.mul_add(x, xx), oy.mul_add(y, yy), oz.mul_add(z, zz));

@@ -4,7 +4,7 @@ use super::gather::Gathering;
 use super::map::PhotonMap;
 use crate::integrator::view_march::{Coverage, Shader, composite};
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::{MarchNotes, PacketMarch, PacketSample, Sample, Track};
+use crate::medium::{MarchNotes, PacketMarch, PacketSample, Track};
 use crate::scene::Scene;
 use crate::simd::{Lanes, MOST_LANES};
 use crate::transfer::{HistoryGroups, Historygram};
@@ -108,11 +108,21 @@ impl View<'_> {
         notes: &mut impl MarchNotes<S>,
     ) -> Rgb {
         let Some(map) = self.map else { return Rgb::BLACK };
-        let ViewSample { at: Sample { position, value }, width, w_out, lane } = *sample;
+        let ViewSample { position, value, width, w_out, lane } = *sample;
         let medium = &*self.scene.medium;
         let optics = medium.transfer().optics(value);
         let event = medium.event(position, &optics);
-        let at = Gathering { position, opacity: optics.opacity, event, w_out, width, lane };
+        let half_spread = map.half_spread(medium, position);
+        let (mut opacity, mut mean) = (optics.opacity, optics.opacity);
+        if half_spread > 0.0 {
+            let ends = [value - half_spread, value + half_spread];
+            opacity = medium.transfer().opacity_range(ends)[1];
+            mean = medium.transfer().mean_opacity(ends);
+            let first = S::f32s::from_fn(simd, |lane| lane as f32).simd_lt(1.0);
+            let ends = [S::f32s::splat(simd, ends[0]), S::f32s::splat(simd, ends[1])];
+            notes.values_between_about(simd, lane, first, ends);
+        }
+        let at = Gathering { position, opacity, mean, half_spread, event, w_out, width, lane };
         map.scattered(simd, medium, &at, distances, notes)
     }
 }
@@ -137,13 +147,7 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
         let (zero, one) = (S::f32s::splat(simd, 0.0), S::f32s::splat(simd, 1.0));
         let medium = &*self.view.scene.medium;
         if medium.transfer().emits() {
-            for (lane, radiance) in self.radiance.iter_mut().enumerate().take(S::WIDTH) {
-                // Lanes without a sample may have any value.
-                let covered = covered.as_slice()[lane];
-                if covered > 0.0 {
-                    *radiance += medium.transfer().emitted(sample.seen(medium, lane).value) * covered;
-                }
-            }
+            sample.add_emitted(simd, medium, covered, &mut self.radiance);
         }
         // Number of gathers for a step, at most one.
         let share = (covered * (1.0 / MOST_COVERED)).max(sample.width / self.spacing).min(one);
@@ -152,11 +156,16 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
         self.due = now.select(due - 1.0, due);
         let weight = now.select(covered / share, zero);
         let width = sample.width / share;
+        if !now.any_true() {
+            return true;
+        }
+        let seen = sample.seen_once(simd, medium, now);
         for lane in 0..S::WIDTH {
             let weight = weight.as_slice()[lane];
             if weight > 0.0 {
                 let here = ViewSample {
-                    at: sample.seen(medium, lane),
+                    position: seen.position(lane),
+                    value: seen.value.as_slice()[lane],
                     width: width.as_slice()[lane],
                     w_out: -self.rays[lane].direction,
                     lane,
@@ -171,7 +180,10 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
 
 /// A sample of one ray.
 struct ViewSample {
-    at: Sample,
+    /// In index space.
+    position: Vec3,
+    /// Data value.
+    value: f32,
     /// Length of the ray that it represents, world units.
     width: f32,
     w_out: Vec3,
@@ -210,6 +222,18 @@ impl<S: Lanes> MarchNotes<S> for Notes<'_> {
         for (&bin, &read) in bin.as_slice().iter().zip(read.as_slice()) {
             let group = self.groups.of_bins()[bin.cast_unsigned() as usize];
             self.read[lane] |= Historygram::from_bits(u128::from(read.cast_unsigned()) << group);
+        }
+    }
+
+    #[inline(always)]
+    fn values_between_about(&mut self, simd: S, lane: usize, read: S::mask32s, [from, to]: [S::f32s; 2]) {
+        let [first, last] = [self.bins.bin_lanes(simd, from), self.bins.bin_lanes(simd, to)];
+        let read = read.select(S::i32s::splat(simd, 1), S::i32s::splat(simd, 0));
+        for i in 0..S::WIDTH {
+            if read.as_slice()[i] > 0 {
+                let bin = |bins: &S::i32s| bins.as_slice()[i].cast_unsigned() as usize;
+                self.read[lane] |= self.groups.between(bin(&first), bin(&last));
+            }
         }
     }
 

@@ -3,7 +3,7 @@
 use super::light_points::{Arrivals, LightPoints};
 use crate::integrator::shadow_grid::{Corners, ShadowGrid};
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::PacketSample;
+use crate::medium::{PacketSample, SeenLanes};
 use crate::scattering::{Brdf, Event, Surface};
 use crate::scene::Scene;
 use crate::simd::{Lanes, MOST_LANES};
@@ -34,17 +34,35 @@ impl<'a> CachedLight<'a> {
         rays: &[Ray; MOST_LANES],
         radiance: &mut [Rgb; MOST_LANES],
     ) {
+        let lanes = covered.simd_gt(S::f32s::splat(simd, 0.0));
+        for site in 0..PacketSample::<S>::SITES {
+            if let Some(seen) = sample.seen(simd, &self.scene.medium, lanes, site) {
+                self.add_seen(simd, &seen, covered * seen.weight, rays, radiance);
+            }
+        }
+    }
+
+    /// [`Self::add`] for one site of each lane's step.
+    #[inline(always)]
+    fn add_seen<S: Lanes>(
+        &mut self,
+        simd: S,
+        seen: &SeenLanes<S>,
+        covered: S::f32s,
+        rays: &[Ray; MOST_LANES],
+        radiance: &mut [Rgb; MOST_LANES],
+    ) {
         let medium = &*self.scene.medium;
-        let edges = medium.edges_lanes(simd, sample.position);
-        let places = self.grid.places(simd, sample.position);
+        let edges = medium.edges_lanes(simd, seen.position);
+        let places = self.grid.places(simd, seen.position);
         let vectors = self.points.vectors::<S>();
-        let ([x, y, z], [nx, ny, nz]) = (&sample.position, &edges.normal);
+        let [nx, ny, nz] = &edges.normal;
         for lane in 0..S::WIDTH {
             let covered = covered.as_slice()[lane];
             if covered <= 0.0 {
                 continue;
             }
-            let optics = medium.transfer().optics(sample.value.as_slice()[lane]);
+            let optics = medium.transfer().optics(seen.value.as_slice()[lane]);
             let q = optics.surface * edges.share.as_slice()[lane];
             let normal = Vec3::new(nx.as_slice()[lane], ny.as_slice()[lane], nz.as_slice()[lane]);
             let event = Event {
@@ -58,8 +76,8 @@ impl<'a> CachedLight<'a> {
                 normal: (q > 0.0).then_some(normal),
                 q,
             };
-            let position = Vec3::new(x.as_slice()[lane], y.as_slice()[lane], z.as_slice()[lane]);
-            let arriving = self.points.arriving(medium.volume().grid(), position, &mut self.space);
+            let grid = medium.volume().grid();
+            let arriving = self.points.arriving(grid, seen.position(lane), &mut self.space);
             let corners = self.grid.corners(&places, lane);
             let light = scattered(simd, &event, -rays[lane].direction, arriving, &corners, vectors);
             radiance[lane] += (optics.emitted() + light) * covered;

@@ -8,7 +8,7 @@ use crate::film::{Goal, PixelSample, Tile};
 use crate::integrator::Stop;
 use crate::integrator::view_march::{Coverage, OPAQUE, Shader, composite};
 use crate::math::{Ray, Rgb, Vec3};
-use crate::medium::{PacketMarch, PacketSample, Sample, Track, TrackStart};
+use crate::medium::{PacketMarch, PacketSample, Track, TrackStart};
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes, Level, MOST_LANES};
 use fearless_simd::prelude::*;
@@ -161,7 +161,7 @@ impl<S: Lanes> Shader<S, ()> for DirectShader<'_, '_> {
     #[inline(always)]
     fn shade(&mut self, simd: S, sample: &PacketSample<S>, covered: S::f32s, _: &mut ()) -> bool {
         let Self { raymarch, scene, packet, cached, stop, moved } = self;
-        let transfer = scene.medium.transfer();
+        let lanes = covered.simd_gt(S::f32s::splat(simd, 0.0));
         if let Some(cached) = cached {
             if *moved && stop.reached() {
                 return false;
@@ -169,36 +169,35 @@ impl<S: Lanes> Shader<S, ()> for DirectShader<'_, '_> {
             cached.add(simd, sample, covered, &packet.rays, &mut packet.radiance);
             *moved = true;
         } else if scene.render.max_scatter > 0 {
-            for lane in packet.shaded..packet.count {
-                let covered = covered.as_slice()[lane];
-                if covered <= 0.0 {
-                    continue;
+            for site in packet.shaded / S::WIDTH..PacketSample::<S>::SITES {
+                let Some(seen) = sample.seen(simd, &scene.medium, lanes, site) else { break };
+                let covered = covered * seen.weight;
+                for lane in packet.shaded % S::WIDTH..packet.count {
+                    let covered = covered.as_slice()[lane];
+                    if covered <= 0.0 {
+                        continue;
+                    }
+                    let (position, value) = (seen.position(lane), seen.value.as_slice()[lane]);
+                    let at = ShadedPosition { position, value, w_out: -packet.rays[lane].direction };
+                    let stopped = *moved && stop.reached();
+                    let source =
+                        if stopped { None } else { raymarch.source(simd, scene, &at, &mut packet.lit, stop) };
+                    let Some(source) = source else {
+                        // The march resumes with this sample, of which some positions are already shaded.
+                        packet.shaded = site * S::WIDTH + lane;
+                        return false;
+                    };
+                    packet.radiance[lane] += source * covered;
+                    *moved = true;
                 }
-                if *moved && stop.reached() {
-                    // The march resumes with this sample, of which some lanes are already shaded.
-                    packet.shaded = lane;
-                    return false;
-                }
-                let Sample { position, value } = sample.seen(&scene.medium, lane);
-                let at = ShadedPosition { position, value, w_out: -packet.rays[lane].direction };
-                let Some(source) = raymarch.source(simd, scene, &at, &mut packet.lit, stop) else {
-                    packet.shaded = lane;
-                    return false;
-                };
-                packet.radiance[lane] += source * covered;
-                *moved = true;
+                packet.shaded = 0;
             }
         } else {
             if *moved && stop.reached() {
                 return false;
             }
-            let glowing = if transfer.emits() { packet.count } else { 0 };
-            for lane in 0..glowing {
-                let covered = covered.as_slice()[lane];
-                if covered > 0.0 {
-                    let value = sample.seen(&scene.medium, lane).value;
-                    packet.radiance[lane] += transfer.emitted(value) * covered;
-                }
+            if scene.medium.transfer().emits() {
+                sample.add_emitted(simd, &scene.medium, covered, &mut packet.radiance);
             }
             *moved = true;
         }
@@ -212,10 +211,10 @@ impl<S: Lanes> Shader<S, ()> for DirectShader<'_, '_> {
 pub struct Packet {
     count: usize,
     rays: [Ray; MOST_LANES],
-    pub(super) tracks: [Track; MOST_LANES],
+    tracks: [Track; MOST_LANES],
     /// The step at which to resume.
     k: [i32; MOST_LANES],
-    /// Number of lanes whose position at that step has already been shaded.
+    /// Number of positions in that step that have already been shaded: the first sites of all lanes come before the second.
     shaded: usize,
     /// What has been found at the next of them.
     lit: LitSoFar,

@@ -21,7 +21,7 @@ pub(super) enum Plan {
     Exact,
     /// As above, since no grid that holds so many light points would be fine enough.
     TooManyPoints,
-    /// As above, since light would be lost between two texels of the finest grid.
+    /// As above, since light would be lost between two texels of the finest grid that fits.
     TooDense,
     /// A grid.
     Grid(Layout),
@@ -49,8 +49,8 @@ impl Plan {
                  too coarse to use; fewer `render.raymarch.light_samples` or lights make it fast",
             ),
             Self::TooDense => Some(
-                "`raymarch` marches every shadow ray, which is slow: matter is so dense that light is lost within a fraction of a voxel, which \
-                 cached shadows are too coarse for; a lower `medium.density` makes it fast",
+                "`raymarch` marches every shadow ray, which is slow: matter is so dense that light is lost between the texels of cached shadows; \
+                 a lower `medium.density` or fewer `render.raymarch.light_samples` make it fast",
             ),
             Self::Grid(layout) if layout.is_coarse() => Some(
                 "`raymarch` keeps shadows in cells wider than a voxel, to stay within 512 MiB; fewer \
@@ -134,7 +134,6 @@ impl RayMarch {
 
 /// Whether transmittances along all rays are still the same, to the last bit.
 fn keeps_shadows(difference: &Difference) -> bool {
-    let Difference { transfer, density, clip, volume, majorants, .. } = difference;
-    // Majorant cells determine the order in which a march sums its samples.
-    transfer.opacity.is_empty() && density.is_none() && !clip && !volume && !majorants
+    let Difference { transfer, density, clip, volume, .. } = difference;
+    transfer.opacity.is_empty() && density.is_none() && !clip && !volume
 }

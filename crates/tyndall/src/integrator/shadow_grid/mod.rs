@@ -50,7 +50,7 @@ pub(super) enum Aim {
     At(Vec3),
 }
 
-/// Where texels are, and what lies between them.
+/// What is needed to measure lengths between texels, and where matter is cut away.
 #[derive(Debug)]
 struct Surroundings {
     /// Products of the vectors of the lattice's units, in lengths of [`Lattice::length_unit`]: squared lengths follow.
@@ -112,7 +112,11 @@ impl Layout {
         // By how much wider the same bytes would be filled, if matter filled the same share of them.
         let wider = |bytes: u64| cast::single((usual.bytes(points) as f64 / bytes as f64).cbrt());
         if voxels == USUAL && usual.bytes(points) <= BYTES_OF_FINER.min(most_bytes) {
-            return Some(layout((USUAL * wider(BYTES_OF_FINER)).max(FINEST)));
+            let mut finer = (USUAL * wider(BYTES_OF_FINER)).max(FINEST);
+            while Bricks::number(&lattice(finer)) > MOST_BRICKS {
+                finer = (finer * COARSER).min(USUAL);
+            }
+            return Some(layout(finer));
         }
         voxels *= wider(most_bytes).max(1.0);
         let spacings = std::iter::successors(Some(voxels), |voxels| Some(voxels * COARSER));
@@ -130,7 +134,7 @@ impl Layout {
         sweeps::most_bytes(self.lattice.texels(), points)
     }
 
-    /// Optical thickness from texel to texel in the densest matter.
+    /// Optical thickness from texel to texel in the densest matter, over the mean edge of a voxel.
     pub fn thickness(&self, medium: &Medium) -> f32 {
         let [_, most] = medium.transfer().opacity_range(medium.volume().value_range().map(cast::single));
         let voxels = self.lattice.spacing().into_iter().fold(0.0, f32::max);

@@ -71,7 +71,7 @@ impl Slab {
         for (row, span) in self.spans.iter_mut().enumerate() {
             *span = span_of(course, bricks, layer, row);
         }
-        let parts = parts(lattice.spacing(), medium.volume().interpolation());
+        let parts = Parts::new(lattice.spacing(), medium);
         let rows = self.extinction[nu * nv..].par_chunks_exact_mut(nu).take(self.count * nv);
         rows.with_min_len(16).enumerate().for_each(|(i, row)| {
             let (m, v) = (i / nv, i % nv);
@@ -121,7 +121,7 @@ struct FillRow<'a> {
     lattice: &'a Lattice,
     bricks: &'a Bricks,
     medium: &'a Medium,
-    parts: &'a [[f32; 3]],
+    parts: &'a Parts,
     layer: usize,
     plane: usize,
     v: usize,
@@ -149,31 +149,57 @@ impl Kernel for FillRow<'_> {
             }
             let mut sum = splat(0.0);
             let texels = (lane + first as f32) * along;
-            for [x, y, z] in parts {
+            for [x, y, z] in &parts.offsets {
                 let mut position = [splat(middle[0] + x), splat(middle[1] + y), splat(middle[2] + z)];
                 position[axes.u] += texels;
-                let value = medium.volume().value_lanes(simd, position);
-                sum += medium.transfer().opacity_lanes(simd, value);
+                sum += parts.opacity(simd, medium, position);
             }
-            let extinction = sum * (density / parts.len() as f32);
+            let extinction = sum * (density / parts.offsets.len() as f32);
             out.copy_from_slice(&extinction.as_slice()[..out.len()]);
         }
     }
 }
 
-/// Offsets, in voxels, of the samples of which the extinction at a texel is the mean: about one for each voxel of the cell around it.
-/// Where values jump from voxel to voxel, at least two along each axis, one on either side of a jump at the texel.
-fn parts(spacing: [f32; 3], interpolation: Interpolation) -> Vec<[f32; 3]> {
-    let least = if interpolation == Interpolation::Nearest { 2 } else { 1 };
-    let counts = spacing.map(|voxels| cast::index(voxels.round()).clamp(least, 3));
-    let along = |a: usize, i: usize| ((i as f32 + 0.5) / counts[a] as f32 - 0.5) * spacing[a];
-    let mut parts = Vec::new();
-    for z in 0..counts[2] {
-        for y in 0..counts[1] {
-            for x in 0..counts[0] {
-                parts.push([along(0, x), along(1, y), along(2, z)]);
+/// The parts of the box around a texel, as wide as texels are apart; their mean is the extinction there.
+struct Parts {
+    /// Their middles, in voxels from the texel.
+    offsets: Vec<[f32; 3]>,
+    /// Their edges, in voxels.
+    edges: [f32; 3],
+    /// Whether opacity may peak between the values inside a part, so that the value in its middle does not stand for it.
+    may_hold_peaks: bool,
+}
+
+impl Parts {
+    /// About one for each voxel of the box, at most three along each axis. Where values jump from voxel to voxel, at least two along each axis, one on either side of
+    /// a jump at the texel.
+    fn new(spacing: [f32; 3], medium: &Medium) -> Self {
+        let jumps = medium.volume().interpolation() == Interpolation::Nearest;
+        let least = if jumps { 2 } else { 1 };
+        let counts = spacing.map(|voxels| cast::index(voxels.round()).clamp(least, 3));
+        let edges = [0, 1, 2].map(|a| spacing[a] / counts[a] as f32);
+        let along = |a: usize, i: usize| (i as f32 + 0.5 - 0.5 * counts[a] as f32) * edges[a];
+        let mut offsets = Vec::new();
+        for z in 0..counts[2] {
+            for y in 0..counts[1] {
+                for x in 0..counts[0] {
+                    offsets.push([along(0, x), along(1, y), along(2, z)]);
+                }
             }
         }
+        let may_hold_peaks = medium.may_peak_within(edges.into_iter().fold(0.0, f32::max));
+        Self { offsets, edges, may_hold_peaks }
     }
-    parts
+
+    /// Mean opacity of a part, about a position in index space: of all values in it, if it may hold peaks.
+    #[inline(always)]
+    fn opacity<S: Lanes>(&self, simd: S, medium: &Medium, position: [S::f32s; 3]) -> S::f32s {
+        let (volume, transfer) = (medium.volume(), medium.transfer());
+        let value = volume.value_lanes(simd, position);
+        if !self.may_hold_peaks {
+            return transfer.opacity_lanes(simd, value);
+        }
+        let half = medium.half_spread_lanes(simd, position, self.edges);
+        transfer.read_lanes(simd, value - half).mean(simd, transfer.read_lanes(simd, value + half))
+    }
 }

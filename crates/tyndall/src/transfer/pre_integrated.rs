@@ -14,8 +14,11 @@ const NEAR: f32 = 0.25;
 /// a program filled in. Nothing that can be seen lies between.
 const EDGE: f32 = 1e6;
 
-/// From `area`, of which a bin of opacity 1 has a million, to bins.
-const BINS_PER_UNIT: f32 = 1e-6;
+/// From units of `area` to bins of opacity 1.
+const BINS_PER_UNIT: f32 = 1.0 / UNITS_PER_BIN;
+
+/// Units of area in a bin of opacity 1: all bins together, twice, fit 32 bits with a sign.
+pub(super) const UNITS_PER_BIN: f32 = 1e6;
 
 /// A value per lane.
 #[derive(Clone, Copy, Debug)]
@@ -58,15 +61,33 @@ impl<S: Lanes> OpacityLanes<S> {
         }
     }
 
+    /// Whether the two are an edge, between which nothing lies.
+    #[inline(always)]
+    pub fn is_edge(self, simd: S, to: Self) -> S::mask32s {
+        (to.position - self.position).abs().simd_gt(S::f32s::splat(simd, EDGE))
+    }
+
+    /// Whether the mean of all values between `self` and `to` is that of the two: they are too near to each other for a quotient of
+    /// differences, or an edge.
+    #[inline(always)]
+    pub fn has_no_quotient(self, simd: S, to: Self) -> S::mask32s {
+        let far = (to.position - self.position).abs();
+        far.simd_lt(S::f32s::splat(simd, NEAR)) | far.simd_gt(S::f32s::splat(simd, EDGE))
+    }
+
+    /// The integral of the opacity from `self` to `to`, in bins.
+    #[inline(always)]
+    pub fn area_to(self, to: Self) -> S::f32s {
+        (to.area - self.area).to_float::<S::f32s>() * BINS_PER_UNIT + (to.part - self.part)
+    }
+
     /// Mean opacity of all values between `self` and `to`.
     #[inline(always)]
     pub fn mean(self, simd: S, to: Self) -> S::f32s {
-        let apart = to.position - self.position;
-        let far = apart.abs();
-        let pass = far.simd_ge(S::f32s::splat(simd, NEAR)) & far.simd_le(S::f32s::splat(simd, EDGE));
-        let area = (to.area - self.area).to_float::<S::f32s>() * BINS_PER_UNIT + (to.part - self.part);
-        let mean = area / pass.select(apart, S::f32s::splat(simd, 1.0));
-        pass.select(mean.max(0.0).min(1.0), (self.opacity + to.opacity) * 0.5)
+        let alone = self.has_no_quotient(simd, to);
+        let apart = alone.select(S::f32s::splat(simd, 1.0), to.position - self.position);
+        let mean = self.area_to(to) / apart;
+        alone.select((self.opacity + to.opacity) * 0.5, mean.max(0.0).min(1.0))
     }
 }
 
@@ -80,10 +101,14 @@ pub(super) struct OpacityRead {
 }
 
 impl OpacityRead {
-    /// Whether the values between are too few, or the values are an edge.
-    fn is_abrupt(self, to: Self) -> [bool; 2] {
-        let far = (to.position - self.position).abs();
-        [far < NEAR, far > EDGE]
+    /// Whether the two are an edge, between which nothing lies.
+    pub fn is_edge(self, to: Self) -> bool {
+        (to.position - self.position).abs() > EDGE
+    }
+
+    /// Whether they are too near to each other for a quotient of differences.
+    fn is_near(self, to: Self) -> bool {
+        (to.position - self.position).abs() < NEAR
     }
 
     /// The integral from here.
@@ -93,93 +118,12 @@ impl OpacityRead {
 
     /// Mean opacity of all values between `self` and `to`.
     pub fn mean(self, to: Self) -> f32 {
-        match self.is_abrupt(to) {
-            [false, false] => (self.area_to(to) / (to.position - self.position)).clamp(0.0, 1.0),
-            _ => 0.5 * (self.opacity + to.opacity),
+        if self.is_edge(to) || self.is_near(to) {
+            return 0.5 * (self.opacity + to.opacity);
         }
+        (self.area_to(to) / (to.position - self.position)).clamp(0.0, 1.0)
     }
 }
-
-/// A place on the way from one value to another.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Between {
-    /// Share of the way.
-    pub share: f32,
-    /// Data value there.
-    pub value: f32,
-}
-
-impl Between {
-    /// Where a share of the opacity met on the way has been met.
-    pub(super) fn of_share(values: [f32; 2], share: f32, read: impl Fn(f32) -> OpacityRead) -> Self {
-        let [from, to] = values.map(&read);
-        match from.is_abrupt(to) {
-            [_, true] => Self::beside(values, [from.opacity, to.opacity], 0.5, share),
-            [true, _] => Self::on_the_way(values, share_of_line([from.opacity, to.opacity], share)),
-            _ => Self::on_the_way(values, search(values, [from, to], share, read)),
-        }
-    }
-
-    /// Where that is if the first value holds up to `border`, a share of the way, and the second after it.
-    pub fn beside([from, to]: [f32; 2], opacities: [f32; 2], border: f32, share: f32) -> Self {
-        let [first, second] = [opacities[0] * border, opacities[1] * (1.0 - border)];
-        let wanted = share * (first + second);
-        if wanted < first || second <= 0.0 {
-            Self { share: if first > 0.0 { border * (wanted / first) } else { share }, value: from }
-        } else {
-            Self { share: border + (1.0 - border) * ((wanted - first) / second), value: to }
-        }
-    }
-
-    fn on_the_way([from, to]: [f32; 2], share: f32) -> Self {
-        // Without a difference that might overflow.
-        Self { share, value: from * (1.0 - share) + to * share }
-    }
-}
-
-/// The share of the way on which a share of the opacity is met, where opacity changes linearly: the root of a quadratic.
-#[inline]
-fn share_of_line([a, b]: [f32; 2], share: f32) -> f32 {
-    let root = (a * a + share * (b * b - a * a)).max(0.0).sqrt();
-    let sum = a + root;
-    if sum > 0.0 { (share * (a + b) / sum).min(1.0) } else { share }
-}
-
-/// The share of the way on which a share of the opacity is met: Newton's method, which knows the derivative, the opacity;
-/// halvings where it would leave the interval.
-#[inline]
-fn search(
-    values: [f32; 2],
-    [from, to]: [OpacityRead; 2],
-    share: f32,
-    read: impl Fn(f32) -> OpacityRead,
-) -> f32 {
-    let total = from.area_to(to);
-    let bins = to.position - from.position;
-    let (mut lo, mut hi) = (0.0, 1.0);
-    let mut at = share_of_line([from.opacity, to.opacity], share);
-    for _ in 0..MOST_TRIES {
-        let here = read(Between::on_the_way(values, at).value);
-        // Both areas are negative where values fall.
-        let missing = share - from.area_to(here) / total;
-        if missing.abs() < SURE * share.min(1.0 - share) {
-            break;
-        }
-        if missing > 0.0 {
-            lo = at;
-        } else {
-            hi = at;
-        }
-        let next = at + missing * total / (here.opacity * bins);
-        at = if next > lo && next < hi { next } else { 0.5 * (lo + hi) };
-    }
-    at
-}
-
-/// Tries in the search, enough for halvings to find a place in single precision, and when a place is near enough: within
-/// this part of the opacity before or behind it.
-const MOST_TRIES: usize = 24;
-const SURE: f32 = 2e-3;
 
 #[cfg(test)]
 mod tests {
@@ -268,24 +212,6 @@ mod tests {
                         (lanes - scalar).abs() < 1e-5,
                         "{lanes}, {scalar} of function {number}, {level:?}"
                     );
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_share_of_the_opacity_is_met_where_it_is_said() {
-        for (number, function) in functions().iter().enumerate() {
-            for [from, to] in pairs() {
-                let whole = function.mean_opacity([from, to]) * (to - from);
-                if (to - from).abs() < 1.0 || whole.abs() < 1e-2 {
-                    continue;
-                }
-                for share in [0.01, 0.5, 0.9] {
-                    let place = function.between([from, to], share);
-                    let met = function.mean_opacity([from, place.value]) * (place.value - from) / whole;
-                    let near = if (place.value - from).abs() < 0.25 { 0.1 } else { 5e-3 };
-                    assert!((met - share).abs() < near, "{met} for {share} from {from} to {to} of {number}");
                 }
             }
         }
