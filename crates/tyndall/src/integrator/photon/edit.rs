@@ -1,5 +1,6 @@
 //! Which light paths, photons and segments remain valid after an edit.
 
+use super::segments::SeenChange;
 use super::stored::Photon;
 use super::{PhotonMapper, SegmentTile, marks_for, plan, step};
 use crate::integrator::cells::ChangeMarks;
@@ -54,7 +55,7 @@ impl PhotonMapper {
         }
         for tile in tiles.iter_mut().flatten() {
             if self.has_segments {
-                tile.add_change(touched.view);
+                tile.add_change(SeenChange { matter: touched.view, colors: touched.colors });
             } else {
                 tile.forget();
             }
