@@ -103,9 +103,11 @@ pub struct Live {
 impl Live {
     /// Renders a patched document from nothing.
     pub fn start(bench: &Bench, patch: &Value, level: Level) -> Result<Self, Failure> {
+        /// As much as is of use.
+        const BYTES: usize = 1 << 30;
         let start = Instant::now();
         let before = bench.scene(patch)?;
-        let session = bench.render(&before, level, 1);
+        let session = bench.render_for_edits(&before, level, 1, BYTES);
         let first = Seconds::of(&session, start);
         Ok(Self { before, session, first })
     }

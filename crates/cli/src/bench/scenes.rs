@@ -4,6 +4,7 @@ use crate::Failure;
 use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::Arc;
+use tyndall::integrator::Resources;
 use tyndall::scene::Scene;
 use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
@@ -69,7 +70,13 @@ impl Bench {
 
     /// Renders a scene from nothing.
     pub fn render(&self, scene: &Scene, level: Level, samples: u32) -> Session {
-        let mut session = Session::with_level(scene.clone(), self.threads.clone(), level);
+        self.render_for_edits(scene, level, samples, 0)
+    }
+
+    /// The same, and keeps as many bytes as this for edits.
+    pub fn render_for_edits(&self, scene: &Scene, level: Level, samples: u32, bytes: usize) -> Session {
+        let resources = Resources { level, edit_memory: bytes };
+        let mut session = Session::with_resources(scene.clone(), self.threads.clone(), resources);
         session.refine(&Budget::samples(samples));
         session
     }

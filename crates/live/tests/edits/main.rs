@@ -1,5 +1,6 @@
 //! Edits of a live session: after any sequence of them, the picture is that of a new session, bit for bit.
 
+mod colors;
 mod live;
 mod photons;
 mod samples;
@@ -11,10 +12,11 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 use tyndall::film::Image;
-use tyndall::integrator::WorkShare;
+use tyndall::integrator::{Resources, WorkShare};
 use tyndall::math::cast;
 use tyndall::scene::{Difference, LightOrigin, Scene};
 use tyndall::session::{Budget, Session};
+use tyndall::simd::Level;
 use tyndall::volume::procedural::{Field, Kind};
 use tyndall::volume::{Interpolation, Volume};
 use tyndall_live::document::{Document, apply};
@@ -214,7 +216,9 @@ fn after_any_edits_photons_and_segments_are_those_from_nothing() {
             "gather_spacing": ([0.0, 1.5, 4.0][round / 4 % 3]),
             "histories": (["interactions", "paths"][round / 5 % 2]),
         });
-        let mut live = Session::new(scene(&value), THREADS.clone());
+        let edit_memory = [1 << 22, 0, 1 << 14][round / 7 % 3];
+        let resources = Resources { level: Level::best(), edit_memory };
+        let mut live = Session::with_resources(scene(&value), THREADS.clone(), resources);
         refined(&mut live, 1);
         let mut edits = Vec::new();
         for _ in 0..5 {

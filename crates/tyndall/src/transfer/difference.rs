@@ -61,6 +61,8 @@ pub struct TransferDifference {
     pub opacity: BinSet,
     /// Albedo, and the share and optics of surfaces: how light scatters.
     pub scattering: BinSet,
+    /// Of these, the share and optics of surfaces: where else only the colour of scattered light changed.
+    pub surfaces: BinSet,
     /// Emission, or the albedo of what glows: which matter is a light.
     pub emission: BinSet,
     /// Refractive index.
@@ -73,7 +75,8 @@ impl TransferDifference {
     pub fn between(old: &TransferFunction, new: &TransferFunction) -> Self {
         if old.bins() != new.bins() {
             let all = BinSet::all();
-            return Self { opacity: all.clone(), scattering: all.clone(), emission: all.clone(), ior: all };
+            let [opacity, scattering, surfaces, emission] = [(); 4].map(|()| all.clone());
+            return Self { opacity, scattering, surfaces, emission, ior: all };
         }
         let mut opacity = interpolated(old, new, |o| [o.opacity]);
         let mut emission = emission(old, new);
@@ -90,6 +93,10 @@ impl TransferDifference {
             scattering: interpolated(old, new, |o| {
                 let (a, s) = (o.albedo, o.specular);
                 [a.r, a.g, a.b, s.r, s.g, s.b, o.surface, o.roughness]
+            }),
+            surfaces: interpolated(old, new, |o| {
+                let s = o.specular;
+                [s.r, s.g, s.b, o.surface, o.roughness]
             }),
             emission,
             ior: interpolated(old, new, |o| [o.ior]),
@@ -248,8 +255,8 @@ mod tests {
         let mut random = SplitMix::new(41);
         let mut uniform = move || cast::single(random.uniform());
         let mut kept = 0;
-        for round in 0..420 {
-            let count = 2 + round / 7 % 7;
+        for round in 0..480 {
+            let count = 2 + round / 8 % 7;
             let mut points: Vec<Point> = (0..count)
                 .map(|_| Point {
                     value: (uniform() * 1100.0 - 40.0).round()
@@ -257,6 +264,7 @@ mod tests {
                     optics: Optics {
                         opacity: uniform(),
                         albedo: Rgb::new(uniform(), 0.5, 0.5),
+                        surface: uniform(),
                         emission: Rgb::splat((uniform() - 0.7).max(0.0)),
                         ..Optics::default()
                     },
@@ -272,7 +280,8 @@ mod tests {
                 points.insert(which + 1, Point { optics: points[0].optics, ..points[which] });
             }
             let (at, mut edited) = (points[which].value, points.clone());
-            match round % 7 {
+            match round % 8 {
+                7 => edited[which].optics.surface = uniform(),
                 0 => edited[which].optics.opacity = uniform(),
                 1 => edited[which].optics.albedo.r = uniform(),
                 2 => edited[which].value += if which + 1 == count { 50.0 } else { 0.0 },
@@ -293,6 +302,7 @@ mod tests {
             // A point may have been inserted between the two of a jump.
             let (Ok(before), Ok(after)) = (before, after) else { continue };
             let difference = TransferDifference::between(&before, &after);
+            assert!(round % 8 != 1 || difference.surfaces.is_empty(), "only an albedo, round {round}");
             let across = (0..11_000_u16).map(|i| f32::from(i) * 0.1 - 30.0);
             let beside = (0..2000_u16).map(|i| at + f32::from(i) * 1e-3 - 1.0);
             for value in across.chain(beside) {
@@ -307,6 +317,9 @@ mod tests {
                 same(&difference.opacity, before.opacity(value), after.opacity(value), "opacity");
                 same(&difference.opacity, a.opacity, b.opacity, "exact opacity");
                 same(&difference.scattering, a.albedo.r, b.albedo.r, "albedo");
+                same(&difference.surfaces, a.surface, b.surface, "surface");
+                let [albedo, again] = [before.albedo(value), before.optics(value).albedo];
+                assert_eq!(albedo.r.to_bits(), again.r.to_bits(), "at {value}");
                 same(&difference.emission, a.emission.r, b.emission.r, "emission");
                 let [a, b] = [&before, &after].map(|function| function.emitted(value).r);
                 same(&difference.emission, a, b, "emission by the table");

@@ -182,6 +182,14 @@ impl TransferFunction {
         a.optics.lerp(&b.optics, t)
     }
 
+    /// Albedo only: equal to the last bit to that of [`Self::optics`].
+    #[inline]
+    #[must_use]
+    pub fn albedo(&self, value: f32) -> Rgb {
+        let (a, b, t) = self.locate(value);
+        a.optics.albedo.lerp(b.optics.albedo, t)
+    }
+
     /// Opacity only, for the many look-ups that need nothing else.
     #[inline]
     #[must_use]

@@ -17,12 +17,6 @@ impl PackedHistories {
         Self { words: Vec::new(), width: usize::from(groups).div_ceil(32) }
     }
 
-    /// `count` empty Historygrams.
-    pub fn with_len(groups: u8, count: usize) -> Self {
-        let width = usize::from(groups).div_ceil(32);
-        Self { words: vec![0; width * count], width }
-    }
-
     /// Changes their number; further ones are empty.
     pub fn resize(&mut self, count: usize) {
         self.words.resize(self.width * count, 0);
@@ -82,7 +76,8 @@ mod tests {
             let mut histories = PackedHistories::new(groups);
             (0..200).for_each(|i| histories.push(some(i)));
             assert_eq!(histories.bytes(), 200 * usize::from(groups) / 8);
-            let mut others = PackedHistories::with_len(groups, 3);
+            let mut others = PackedHistories::new(groups);
+            others.resize(3);
             others.extend(&histories, 50..150);
             others.set(1, some(5));
             assert!((0..200).all(|i| histories.get(i as usize) == some(i)));

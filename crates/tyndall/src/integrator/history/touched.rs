@@ -13,6 +13,8 @@ pub(crate) struct Touched {
     pub paths: Past,
     /// Values whose change is visible along a view ray.
     pub view: Historygram,
+    /// Values whose albedo multiplies scattered light, where nothing else of a view ray changed.
+    pub colors: Historygram,
     /// Values with non-zero opacity before or after the edit.
     pub matter: Historygram,
     /// Whether paths from glowing matter may start differently.
@@ -32,12 +34,13 @@ impl Touched {
         let transfer = &difference.transfer;
         let opacity = groups.query(&transfer.opacity);
         let flight = if difference.density.is_some() { matter | opacity } else { opacity };
-        let mut scatter = groups.query(&transfer.scattering);
+        let [mut scatter, mut surfaces] =
+            [&transfer.scattering, &transfer.surfaces].map(|bins| groups.query(bins));
         if difference.phase || difference.surfaces {
-            scatter = Historygram::ALL;
+            (scatter, surfaces) = (Historygram::ALL, Historygram::ALL);
         }
         // Nothing scatters where there is no matter.
-        let scatter = scatter & matter;
+        let (scatter, surfaces) = (scatter & matter, surfaces & matter);
         let glowing = bins_where(&|transfer, bin| transfer.emission_bound(around(transfer, bin)) > 0.0);
         let emission = groups.query(&transfer.emission);
         // The weight of a cell depends on all matter in it, including matter that does not glow.
@@ -45,7 +48,8 @@ impl Touched {
         let moved = matches!(positions, [Some(old), Some(new)] if !old.same_cells(new));
         Self {
             paths: Past { flight, scatter },
-            view: flight | scatter | (emission & matter),
+            view: flight | surfaces | (emission & matter),
+            colors: scatter,
             matter,
             glow: moved || !emission.is_empty() || flight.meets(glowing),
         }

@@ -1,6 +1,7 @@
 //! Which light paths, photons and segments remain valid after an edit.
 
 use super::gather::between_points;
+use super::segments::SeenChange;
 use super::stored::Photon;
 use super::{PhotonMapper, SegmentTile, cells_for, marks_for, plan, step};
 use crate::integrator::cells::ChangeMarks;
@@ -61,7 +62,7 @@ impl PhotonMapper {
         }
         for tile in tiles.iter_mut().flatten() {
             if self.has_segments {
-                tile.add_change(touched.view);
+                tile.add_change(SeenChange { matter: touched.view, colors: touched.colors });
             } else {
                 tile.forget();
             }

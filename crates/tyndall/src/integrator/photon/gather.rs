@@ -33,9 +33,18 @@ pub(super) struct Gathering {
     pub lane: usize,
 }
 
+/// Light that a position scatters to the viewer, per unit extinction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Scattered {
+    /// To be multiplied by the albedo.
+    Plain(Rgb),
+    /// By a glossy surface, whose albedo is not a factor.
+    Glossy(Rgb),
+}
+
 impl PhotonMap {
-    /// Light from all directions that a position scatters to the viewer, per unit extinction. `notes` records the
-    /// values that are read around the position.
+    /// Light from all directions that a position scatters to the viewer. `notes` records the values that are read
+    /// around the position.
     #[inline(always)]
     pub fn scattered<S: Lanes>(
         &self,
@@ -44,7 +53,7 @@ impl PhotonMap {
         at: &Gathering,
         distances: &mut Vec<f32>,
         notes: &mut impl MarchNotes<S>,
-    ) -> Rgb {
+    ) -> Scattered {
         let (points, number) = (&self.points, number_of(at.position));
         match self.estimate {
             Estimator::Point => self.within(simd, medium, at, Ball::new(1.0, number, points), notes),
@@ -75,7 +84,7 @@ impl PhotonMap {
         at: &Gathering,
         mut kernel: R,
         notes: &mut impl MarchNotes<S>,
-    ) -> Rgb {
+    ) -> Scattered {
         let q = self.grid.to_metric(at.position);
         let index = self.grid.index_per_metric();
         let mut matter = Matter::about(simd, medium, at, index, &kernel, notes);
@@ -86,7 +95,7 @@ impl PhotonMap {
             matter = Matter::about(simd, medium, at, index, &kernel, notes);
         }
         if matter.opacity <= 0.0 {
-            return Rgb::BLACK;
+            return Scattered::Plain(Rgb::BLACK);
         }
         let slope = matter.slope;
         let own = S::f32s::splat(simd, at.opacity);
@@ -112,7 +121,8 @@ impl PhotonMap {
         }
         let light = sum.total() / (kernel.volume() * matter.opacity);
         // The quotient overflows single precision only in matter so thin that it is invisible.
-        if light.to_array().iter().all(|x| x.is_finite()) { light } else { Rgb::BLACK }
+        let light = if light.is_finite() { light } else { Rgb::BLACK };
+        if let Scattering::Glossy = sum.kind { Scattered::Glossy(light) } else { Scattered::Plain(light) }
     }
 
     /// Photons from the `i`-th on, relative to a metric position.
@@ -196,7 +206,8 @@ struct Sum<'a, S: Lanes> {
     kind: Scattering,
     /// Still to be multiplied by the albedo.
     lanes: [S::f32s; 3],
-    rest: Rgb,
+    /// Of glossy surfaces.
+    glossy: Rgb,
 }
 
 /// How a photon's weight depends on its direction.
@@ -228,7 +239,7 @@ impl<'a, S: Lanes> Sum<'a, S> {
             (_, _, Phase::Isotropic) => Scattering::Even,
             _ => Scattering::Smooth(0.0, Vec3::ZERO),
         };
-        Self { simd, event, w_out, kind, lanes: [zero; 3], rest: Rgb::BLACK }
+        Self { simd, event, w_out, kind, lanes: [zero; 3], glossy: Rgb::BLACK }
     }
 
     #[inline(always)]
@@ -263,7 +274,7 @@ impl<'a, S: Lanes> Sum<'a, S> {
             if weight != 0.0 {
                 let w_in = -PackedDirection::from_word(map.directions[i]).unpack();
                 let flux = Rgb::new(map.red[i], map.green[i], map.blue[i]);
-                self.rest += self.event.eval(self.w_out, w_in) * flux * weight;
+                self.glossy += self.event.eval(self.w_out, w_in) * flux * weight;
             }
         }
     }
@@ -272,7 +283,7 @@ impl<'a, S: Lanes> Sum<'a, S> {
     fn total(&self) -> Rgb {
         let [red, green, blue] = self.lanes;
         let sum = Rgb::new(total(red.as_slice()), total(green.as_slice()), total(blue.as_slice()));
-        sum * self.event.surface.albedo + self.rest
+        sum + self.glossy
     }
 }
 

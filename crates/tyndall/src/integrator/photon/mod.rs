@@ -11,6 +11,7 @@
 
 mod edit;
 mod gather;
+mod gathers;
 mod kernel;
 mod map;
 mod matter;
@@ -32,7 +33,7 @@ use super::{
     Edited, ItemChanges, KeptCount, KeptItems, Limits, MemoryNeed, Method, MethodReport, NamedCount,
     PixelCounts, Resources, SettingProblem, StageNames, Stop, Updated, WorkShare, drop_elsewhere,
 };
-use crate::film::{Goal, Tile};
+use crate::film::{Film, Goal, Tile};
 use crate::light::Enclosure;
 use crate::math::DVec3;
 use crate::scene::{Difference, Scene};
@@ -50,6 +51,8 @@ use view::View;
 pub struct PhotonMapper {
     settings: Settings,
     ground: Ground,
+    /// Bytes of gathers that may be kept.
+    gather_memory: usize,
     lights: Vec<LightPaths<Photon>>,
     /// Paths of the base map that are gone, with photons whose positions are yet to be marked.
     gone: Vec<Chunk<Photon>>,
@@ -73,8 +76,16 @@ impl PhotonMapper {
         let photon = size_of::<Photon>() as u64 + map::BYTES;
         let interactions = most_kept(max_scatter) * (2 * photon + 2 * history) as f64;
         let paths = f64::from(settings.photons) * (interactions + (16 + 2 * history) as f64);
-        let segments = u64::from(size[0]) * u64::from(size[1]) * u64::from(settings.segments);
-        crate::math::cast::whole(paths).saturating_add(segments.saturating_mul(segment::BYTES + history))
+        let pixels = pixels(size);
+        let segment = segment::BYTES + history + gathers::BYTES;
+        let segments = (pixels as u64).saturating_mul(u64::from(settings.segments));
+        let view = segments.saturating_mul(segment).saturating_add(gathers::most_bytes(pixels) as u64);
+        crate::math::cast::whole(paths).saturating_add(view)
+    }
+
+    /// Bytes of a tile's gathers that may be kept.
+    fn gather_memory(&self, size: [u32; 2]) -> usize {
+        self.gather_memory.min(gathers::most_bytes(pixels(size))) / Film::tile_count(size)
     }
 
     /// Number of photons of the base map, once traced.
@@ -163,6 +174,7 @@ impl Method for PhotonMapper {
         Self {
             settings: *settings,
             ground: Ground { reading, enclosure, level: resources.level },
+            gather_memory: resources.edit_memory,
             lights,
             gone: Vec::new(),
             map: MapState::Absent,
@@ -249,9 +261,8 @@ impl Method for PhotonMapper {
         }
         let Ground { reading: Reading { groups, cells, .. }, level, .. } = &self.ground;
         let per_ray = self.settings.segments as usize;
-        let segments =
-            segments.get_or_insert_with(|| SegmentTile::new(tile.pixel_count(), per_ray, groups.count()));
-        segments.make_room(tile.pixel_count());
+        let segments = segments.get_or_insert_with(|| SegmentTile::new(per_ray, groups.count()));
+        segments.make_room(tile.pixel_count(), self.gather_memory(scene.size));
         let view = View { scene, map: self.map.ready(), step, gather_spacing };
         let positions = &self.marks;
         level.run(GatherSegments { view, segments, tile, goal, groups, cells, positions, stop });
@@ -263,12 +274,14 @@ impl Method for PhotonMapper {
         let computed = sum(|tile| tile.computed.segments);
         let traced = self.traced;
         let segments_kept = KeptCount { name: "segments", count: segments, bytes };
+        let (count, bytes) = (sum(SegmentTile::gathers), sum(SegmentTile::bytes_of_gathers));
+        let gathers_kept = KeptCount { name: "gathers", count, bytes };
         MethodReport {
             recomputed: vec![
                 WorkShare::new("photons", traced, self.paths()),
                 WorkShare::new("segments", computed, segments),
             ],
-            kept: self.kept_paths().into_iter().chain([segments_kept]).collect(),
+            kept: self.kept_paths().into_iter().chain([segments_kept, gathers_kept]).collect(),
             items_computed: Some(traced + computed),
             counts: vec![NamedCount { name: "gathers", count: sum(|tile| tile.computed.gathers) }],
             stages: StageNames { preparation: Some("photons"), sampling: "segments" },
@@ -329,6 +342,11 @@ fn marks_for(scene: &Scene, settings: &Settings) -> ChangeMarks {
             ChangeMarks::cells(grid, medium.volume().cells_of(medium.majorants().voxels()), enough)
         }
     }
+}
+
+/// Number of pixels of a picture.
+fn pixels(size: [u32; 2]) -> usize {
+    size[0] as usize * size[1] as usize
 }
 
 /// Light paths and view-ray segments at one point in time.

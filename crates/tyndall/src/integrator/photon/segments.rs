@@ -1,5 +1,6 @@
 //! View rays divided into segments, each computed, kept and invalidated independently \[Jonsson12, sec. 4.3.2\].
 
+use super::gathers::{KeptGathers, LaneGathers};
 use super::segment::Segment;
 use super::view::{Notes, Stretches, View};
 use crate::film::{Goal, PixelSample, Tile};
@@ -21,13 +22,24 @@ pub struct SegmentTile {
     segments: Vec<Segment>,
     /// Values that each segment read.
     histories: PackedHistories,
+    /// Of known segments.
+    gathers: KeptGathers,
     /// Whether none is known, whatever they hold; their memory will be reused.
     forgotten: bool,
-    /// Values that have changed since the segments were last invalidated; `None` without an edit.
-    changed: Option<Historygram>,
-    /// Number of pixels whose segments have been asked where photons changed, if a stop interrupted that.
+    /// What has changed since the segments were last invalidated; `None` without an edit.
+    changed: Option<SeenChange>,
+    /// Number of pixels whose segments have been asked, if a stop interrupted that.
     asked: usize,
     pub(super) computed: SegmentCounts,
+}
+
+/// Values whose change is visible along a view ray.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct SeenChange {
+    /// Those of which more changed than the albedo.
+    pub matter: Historygram,
+    /// Those whose albedo changed.
+    pub colors: Historygram,
 }
 
 /// Work done since the last edit.
@@ -40,14 +52,14 @@ pub(super) struct SegmentCounts {
 }
 
 impl SegmentTile {
-    /// For this many pixels, nothing known yet.
-    pub fn new(pixels: usize, per_ray: usize, groups: u8) -> Self {
-        let count = pixels * per_ray;
+    /// Without segments.
+    pub fn new(per_ray: usize, groups: u8) -> Self {
         Self {
             per_ray,
-            segments: vec![Segment::UNKNOWN; count],
-            histories: PackedHistories::with_len(groups, count),
-            forgotten: false,
+            segments: Vec::new(),
+            histories: PackedHistories::new(groups),
+            gathers: KeptGathers::default(),
+            forgotten: true,
             changed: None,
             asked: 0,
             computed: SegmentCounts::default(),
@@ -60,10 +72,11 @@ impl SegmentTile {
         self.changed = None;
     }
 
-    /// Makes room for this many pixels if the segments were forgotten.
-    pub fn make_room(&mut self, pixels: usize) {
+    /// Makes room for this many pixels if the segments were forgotten, and for as many bytes of their gathers.
+    pub fn make_room(&mut self, pixels: usize, bytes_of_gathers: usize) {
         if std::mem::take(&mut self.forgotten) {
             let count = pixels * self.per_ray;
+            self.gathers.reset(count, bytes_of_gathers);
             self.segments.clear();
             self.segments.resize(count, Segment::UNKNOWN);
             self.histories.resize(count);
@@ -78,6 +91,16 @@ impl SegmentTile {
     /// Size in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.segments[..]) + self.histories.bytes()
+    }
+
+    /// Number of their gathers that are kept.
+    pub fn gathers(&self) -> usize {
+        self.gathers.len()
+    }
+
+    /// Size of these in bytes.
+    pub fn bytes_of_gathers(&self) -> usize {
+        self.gathers.bytes()
     }
 
     /// Differences between its known segments and those known at another time; all are new if the number of segments
@@ -100,8 +123,9 @@ impl SegmentTile {
     }
 
     /// Records which values an edit changed; photons may have changed anywhere.
-    pub fn add_change(&mut self, values: Historygram) {
-        self.changed = Some(self.changed.unwrap_or_default() | values);
+    pub(super) fn add_change(&mut self, change: SeenChange) {
+        let SeenChange { matter, colors } = self.changed.unwrap_or_default();
+        self.changed = Some(SeenChange { matter: matter | change.matter, colors: colors | change.colors });
         self.asked = 0;
     }
 
@@ -110,33 +134,45 @@ impl SegmentTile {
         self.changed.is_none()
     }
 
-    /// Invalidates the segments that the recorded changes touch; false if stopped first.
+    /// Invalidates the segments that the recorded changes touch, except that those of which only colours changed are
+    /// summed anew from their gathers; false if stopped first.
     fn invalidate(&mut self, view: &View, tile: &Tile, positions: &ChangeMarks, stop: &Stop) -> bool {
         let Some(changed) = self.changed else { return true };
-        if !changed.is_empty() {
-            for i in 0..self.len() {
-                if self.histories.get(i).meets(changed) {
+        for pixel in tile.positions(self.asked..tile.pixel_count()) {
+            let first = self.asked * self.per_ray;
+            let of_ray = first..first + self.per_ray;
+            for i in of_ray.clone() {
+                if positions.everywhere() || self.histories.get(i).meets(changed.matter) {
                     self.segments[i] = Segment::UNKNOWN;
                 }
             }
-        }
-        if positions.everywhere() {
-            self.segments.fill(Segment::UNKNOWN);
-        } else if positions.any() {
-            let pixels = tile.positions(self.asked..tile.pixel_count());
-            let segments = &mut self.segments[self.asked * self.per_ray..];
-            for (pixel, segments) in pixels.zip(segments.chunks_exact_mut(self.per_ray)) {
-                if segments.iter().any(Segment::is_known) {
-                    forget_near(view, pixel, positions, segments);
-                }
-                self.asked += 1;
-                if stop.reached() {
-                    return false;
-                }
+            let segments = &mut self.segments[of_ray.clone()];
+            if positions.any() && segments.iter().any(Segment::is_known) {
+                forget_near(view, pixel, positions, segments);
+            }
+            for i in of_ray {
+                self.recolor(i, view, changed.colors);
+            }
+            self.asked += 1;
+            if stop.reached() {
+                return false;
             }
         }
         self.changed = None;
         true
+    }
+
+    /// Sums a segment's light anew if it met any of these values; it is then no longer known if its gathers are not.
+    fn recolor(&mut self, i: usize, view: &View, colors: Historygram) {
+        if self.segments[i].is_known() && self.histories.get(i).meets(colors) {
+            match self.gathers.radiance(i, view.scene.medium.transfer()) {
+                Some(radiance) => self.segments[i].radiance = radiance.to_array(),
+                None => self.segments[i] = Segment::UNKNOWN,
+            }
+        }
+        if !self.segments[i].is_known() {
+            self.gathers.forget(i);
+        }
     }
 
     /// The first segment of a ray that is visible but not known; `None` if there is none.
@@ -271,6 +307,7 @@ impl Kernel for GatherSegments<'_> {
         }
         // Rays with missing segments, in pixel order; each round computes one segment per ray.
         let mut lacking: Vec<usize> = turn.clone().filter(|&ray| segments.missing(ray).is_some()).collect();
+        let mut gathers = LaneGathers::default();
         while !lacking.is_empty() {
             for packet in lacking.chunks(S::WIDTH) {
                 let mut stretches = Stretches::default();
@@ -285,12 +322,15 @@ impl Kernel for GatherSegments<'_> {
                     numbers[lane] = ray * segments.per_ray + segment;
                 }
                 let bins = view.scene.medium.transfer().bins();
-                let mut notes = Notes { groups, bins, cells, read: [Historygram::EMPTY; MOST_LANES] };
+                gathers.clear();
+                let read = [Historygram::EMPTY; MOST_LANES];
+                let mut notes = Notes { groups, bins, cells, read, gathers: &mut gathers };
                 let found = view.march(simd, &stretches, &mut notes);
                 for lane in 0..packet.len() {
                     let steps = [stretches.from[lane], stretches.to[lane]];
                     segments.segments[numbers[lane]] = Segment::new(&found[lane], ends(steps, view.step));
                     segments.histories.set(numbers[lane], notes.read[lane]);
+                    segments.gathers.set(numbers[lane], notes.gathers.of(lane));
                     segments.computed.gathers += found[lane].gathers;
                 }
                 segments.computed.segments += packet.len();

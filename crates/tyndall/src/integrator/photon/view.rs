@@ -1,6 +1,7 @@
 //! View rays through matter lit by photons \[Jonsson12, eq. 2\]: packets of ray segments.
 
-use super::gather::Gathering;
+use super::gather::{Gathering, Scattered};
+use super::gathers::{Gathered, LaneGathers};
 use super::map::PhotonMap;
 use crate::integrator::view_march::{Coverage, Shader, composite};
 use crate::math::{Ray, Rgb, Vec3};
@@ -63,11 +64,22 @@ pub(super) struct Stretch {
     pub gathers: usize,
 }
 
+/// Listener to a march that gathers photons.
+pub(super) trait GatherNotes<S: Lanes>: MarchNotes<S> {
+    /// Part of the radiance of a lane's ray; `None` if an albedo is in it, but not as a factor.
+    fn gathered(&mut self, lane: usize, light: Option<Gathered>);
+}
+
+impl<S: Lanes> GatherNotes<S> for () {
+    #[inline(always)]
+    fn gathered(&mut self, _: usize, _: Option<Gathered>) {}
+}
+
 impl View<'_> {
     /// Marches all stretches to their ends, or until they are opaque. A lane's result does not depend on the other
     /// lanes.
     #[inline(always)]
-    pub fn march<S: Lanes, N: MarchNotes<S>>(
+    pub fn march<S: Lanes, N: GatherNotes<S>>(
         &self,
         simd: S,
         stretches: &Stretches,
@@ -76,7 +88,8 @@ impl View<'_> {
         let mut gathering = GatheringShader {
             view: self,
             rays: &stretches.rays,
-            radiance: [Rgb::BLACK; MOST_LANES],
+            scattered: [Rgb::BLACK; MOST_LANES],
+            emitted: [Rgb::BLACK; MOST_LANES],
             gathers: [0; MOST_LANES],
             due: S::f32s::from_slice(simd, &stretches.due[..S::WIDTH]),
             spacing: self.gather_spacing * self.map.map_or(0.0, |map| map.radius),
@@ -88,27 +101,30 @@ impl View<'_> {
         let ends = |k: &[i32; MOST_LANES]| S::i32s::from_slice(simd, &k[..S::WIDTH]);
         march.go_between(ends(&stretches.from), ends(&stretches.to));
         composite(simd, &mut march, &mut seen, &mut gathering, notes);
-        let GatheringShader { radiance, gathers, .. } = gathering;
+        let GatheringShader { scattered, emitted, gathers, .. } = gathering;
         let mut found = [Stretch::default(); MOST_LANES];
         for lane in 0..S::WIDTH {
             let transmittance = 1.0 - seen.alpha.as_slice()[lane];
             let depth = seen.depth.as_slice()[lane];
-            found[lane] = Stretch { radiance: radiance[lane], transmittance, depth, gathers: gathers[lane] };
+            // Last, so that the sum of all that was noted has the same bits.
+            notes.gathered(lane, Some(Gathered::emitted(emitted[lane])));
+            let radiance = scattered[lane] + emitted[lane];
+            found[lane] = Stretch { radiance, transmittance, depth, gathers: gathers[lane] };
         }
         found
     }
 
-    /// Light that a sample scatters to the viewer, per unit extinction.
+    /// Light that a sample scatters to the viewer.
     #[inline(always)]
     fn scattered<S: Lanes>(
         &self,
         simd: S,
         sample: &ViewSample,
         distances: &mut Vec<f32>,
-        notes: &mut impl MarchNotes<S>,
+        notes: &mut impl GatherNotes<S>,
     ) -> Rgb {
         let Some(map) = self.map else { return Rgb::BLACK };
-        let ViewSample { position, value, width, w_out, lane } = *sample;
+        let ViewSample { position, value, weight, width, w_out, lane } = *sample;
         let medium = &*self.scene.medium;
         let optics = medium.transfer().optics(value);
         let event = medium.event(position, &optics);
@@ -123,7 +139,17 @@ impl View<'_> {
             notes.values_between_about(simd, lane, first, ends);
         }
         let at = Gathering { position, opacity, mean, half_spread, event, w_out, width, lane };
-        map.scattered(simd, medium, &at, distances, notes)
+        match map.scattered(simd, medium, &at, distances, notes) {
+            Scattered::Plain(light) => {
+                let light = light * weight;
+                notes.gathered(lane, Some(Gathered::scattered(light, value)));
+                light * optics.albedo
+            }
+            Scattered::Glossy(light) => {
+                notes.gathered(lane, None);
+                light * weight
+            }
+        }
     }
 }
 
@@ -131,7 +157,8 @@ impl View<'_> {
 struct GatheringShader<'a, S: Lanes> {
     view: &'a View<'a>,
     rays: &'a [Ray; MOST_LANES],
-    radiance: [Rgb; MOST_LANES],
+    scattered: [Rgb; MOST_LANES],
+    emitted: [Rgb; MOST_LANES],
     gathers: [usize; MOST_LANES],
     /// Fraction of a gather that is due.
     due: S::f32s,
@@ -141,13 +168,13 @@ struct GatheringShader<'a, S: Lanes> {
     distances: Vec<f32>,
 }
 
-impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
+impl<S: Lanes, N: GatherNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
     #[inline(always)]
     fn shade(&mut self, simd: S, sample: &PacketSample<S>, covered: S::f32s, notes: &mut N) -> bool {
         let (zero, one) = (S::f32s::splat(simd, 0.0), S::f32s::splat(simd, 1.0));
         let medium = &*self.view.scene.medium;
         if medium.transfer().emits() {
-            sample.add_emitted(simd, medium, covered, &mut self.radiance);
+            sample.add_emitted(simd, medium, covered, &mut self.emitted);
         }
         // Number of gathers for a step, at most one.
         let share = (covered * (1.0 / MOST_COVERED)).max(sample.width / self.spacing).min(one);
@@ -166,11 +193,12 @@ impl<S: Lanes, N: MarchNotes<S>> Shader<S, N> for GatheringShader<'_, S> {
                 let here = ViewSample {
                     position: seen.position(lane),
                     value: seen.value.as_slice()[lane],
+                    weight,
                     width: width.as_slice()[lane],
                     w_out: -self.rays[lane].direction,
                     lane,
                 };
-                self.radiance[lane] += self.view.scattered(simd, &here, &mut self.distances, notes) * weight;
+                self.scattered[lane] += self.view.scattered(simd, &here, &mut self.distances, notes);
                 self.gathers[lane] += 1;
             }
         }
@@ -184,19 +212,29 @@ struct ViewSample {
     position: Vec3,
     /// Data value.
     value: f32,
+    /// Share of its light that the viewer sees.
+    weight: f32,
     /// Length of the ray that it represents, world units.
     width: f32,
     w_out: Vec3,
     lane: usize,
 }
 
-/// Records what each lane's ray segment reads.
+/// Records what each lane's ray segment reads and gathers.
 pub(super) struct Notes<'a> {
     pub groups: &'a HistoryGroups,
     pub bins: ValueBins,
     /// For each majorant cell, the groups of values that can occur in it.
     pub cells: &'a [Historygram],
     pub read: [Historygram; MOST_LANES],
+    pub gathers: &'a mut LaneGathers,
+}
+
+impl<S: Lanes> GatherNotes<S> for Notes<'_> {
+    #[inline(always)]
+    fn gathered(&mut self, lane: usize, light: Option<Gathered>) {
+        self.gathers.add(lane, light);
+    }
 }
 
 impl<S: Lanes> MarchNotes<S> for Notes<'_> {
