@@ -466,8 +466,6 @@ mod tests {
         for interpolation in [Interpolation::Linear, Interpolation::Nearest] {
             let medium = medium(&mut random, interpolation);
             let steps = steps(&mut random);
-            // A border between voxels is found to a 64th of a step.
-            let near = if medium.interpolates { 0.02 } else { 0.03 };
             for share in [0.1, 0.5, 0.8] {
                 for level in Level::available() {
                     let found = level.run(Found(&medium, &steps, share));
@@ -479,7 +477,9 @@ mod tests {
                             .collect();
                         let expected = opacities.iter().sum::<f64>() / f64::from(PARTS);
                         let off = (f64::from(mean) - expected).abs();
-                        assert!(off < near * expected.max(0.1), "{mean} for {expected}, {level:?}");
+                        // A border between voxels is found to a 128th of a step, on which opacity may rise to 1.
+                        let near = if medium.interpolates { 0.002 } else { 0.008 };
+                        assert!(off < near, "{mean} for {expected}, {level:?}");
                         let before = opacities.iter().take(cast::index(met * f32::from(PARTS))).sum::<f64>();
                         let before = before / f64::from(PARTS) / expected.max(1e-9);
                         let apart = (before - f64::from(share)).abs();
