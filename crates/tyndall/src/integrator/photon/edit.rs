@@ -2,7 +2,7 @@
 
 use super::segments::SeenChange;
 use super::stored::Photon;
-use super::{PhotonMapper, SegmentTile, marks_for, plan, step};
+use super::{PhotonMapper, SegmentTile, gather_memory, marks_for, plan, step};
 use crate::integrator::cells::ChangeMarks;
 use crate::integrator::history::{MovedBounds, Touched};
 use crate::integrator::light_paths::{Chunk, LightPaths, PathSource, sources};
@@ -52,6 +52,12 @@ impl PhotonMapper {
         }
         if difference.camera || difference.size || step_changed {
             self.has_segments = false;
+        }
+        if difference.size {
+            // The tiles, of which there may be fewer, give back all memory.
+            let gathers: Vec<_> = tiles.iter_mut().flatten().map(SegmentTile::take_gathers).collect();
+            drop_elsewhere(gathers);
+            self.gather_memory = gather_memory(new, self.edit_memory);
         }
         for tile in tiles.iter_mut().flatten() {
             if self.has_segments {

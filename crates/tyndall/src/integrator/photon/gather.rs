@@ -24,17 +24,38 @@ pub(super) struct Gathering {
     pub w_out: Vec3,
     /// Length of the view ray that the position represents, world units.
     pub width: f32,
+    /// Share of its light that the viewer sees.
+    pub weight: f32,
     /// The ray's lane in its packet.
     pub lane: usize,
 }
 
-/// Light that a position scatters to the viewer, per unit extinction.
+/// Light that a position scatters to the viewer, times the share that the viewer sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Scattered {
-    /// To be multiplied by the albedo.
-    Plain(Rgb),
+    /// To be multiplied by the albedo; if it can be gathered again, with where that is.
+    Plain(Rgb, Option<Site>),
     /// By a glossy surface, whose albedo is not a factor.
     Glossy(Rgb),
+}
+
+/// What a point estimate depends on besides photons and the optics at its position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Site {
+    /// Index space.
+    position: Vec3,
+    /// See [`Gathering::weight`].
+    weight: f32,
+    /// See [`Matter`].
+    slope: Vec3,
+    opacity: f32,
+    /// See [`Ball::flattening`].
+    axis: Vec3,
+    share: f32,
+    /// Zero where there is no surface.
+    normal: Vec3,
+    /// The share of the surface.
+    q: f32,
 }
 
 impl PhotonMap {
@@ -51,29 +72,62 @@ impl PhotonMap {
     ) -> Scattered {
         let (points, number) = (&self.points, number_of(at.position));
         match self.estimate {
-            Estimator::Point => self.within(simd, medium, at, Ball::new(1.0, number, points), notes),
+            Estimator::Point => {
+                let ball = Ball::new(1.0, number, points);
+                let (ball, matter) = self.fit(simd, medium, at, ball, notes);
+                match self.within(simd, at, &ball, &matter) {
+                    Scattered::Plain(light, _) => {
+                        Scattered::Plain(light, Some(Site::new(at, &ball, &matter)))
+                    }
+                    glossy @ Scattered::Glossy(_) => glossy,
+                }
+            }
             Estimator::Nearest(count) => {
                 let radius = self.radius_of(simd, at, count as usize, distances);
-                self.within(simd, medium, at, Ball::new(radius, number, points), notes)
+                let ball = Ball::new(radius, number, points);
+                let (ball, matter) = self.fit(simd, medium, at, ball, notes);
+                self.within(simd, at, &ball, &matter)
             }
             Estimator::Beam => {
                 let slice = Slice::new(at.width / self.radius, -at.w_out, number, points);
-                self.within(simd, medium, at, slice, notes)
+                let (slice, matter) = self.fit(simd, medium, at, slice, notes);
+                self.within(simd, at, &slice, &matter)
             }
         }
     }
 
-    /// The estimate from the photons in a region.
+    /// The light at a site with this data value, still to be multiplied by the albedo: equal to the last bit to that of
+    /// [`Self::scattered`].
     #[inline(always)]
-    fn within<S: Lanes, R: GatherRegion>(
+    pub fn scattered_again<S: Lanes>(
+        &self,
+        simd: S,
+        medium: &Medium,
+        site: &Site,
+        value: f32,
+        w_out: Vec3,
+    ) -> Rgb {
+        let Site { position, weight, slope, opacity, axis, share, normal, q } = *site;
+        let optics = medium.transfer().optics(value);
+        let event = medium.event_at_surface(&optics, (q > 0.0).then_some(normal), q);
+        let at = Gathering { position, opacity: optics.opacity, event, w_out, width: 0.0, weight, lane: 0 };
+        let matter = Matter { opacity, slope, lean: Vec3::ZERO };
+        match self.within(simd, &at, &Ball::flat(axis, share, &self.points), &matter) {
+            Scattered::Plain(light, _) | Scattered::Glossy(light) => light,
+        }
+    }
+
+    /// Fits the matter about a position, and a region to it.
+    #[inline(always)]
+    fn fit<S: Lanes, R: GatherRegion>(
         &self,
         simd: S,
         medium: &Medium,
         at: &Gathering,
         mut kernel: R,
         notes: &mut impl MarchNotes<S>,
-    ) -> Scattered {
-        let (q, here) = (self.grid.to_metric(at.position), (at.position, at.opacity, at.lane));
+    ) -> (R, Matter) {
+        let here = (at.position, at.opacity, at.lane);
         let index = self.grid.index_per_metric();
         let mut matter = Matter::about(simd, medium, here, index, &kernel, notes);
         // The radius in world units, divided by the mean free path.
@@ -82,10 +136,22 @@ impl PhotonMap {
             kernel = kernel.flattened(axis, share);
             matter = Matter::about(simd, medium, here, index, &kernel, notes);
         }
+        (kernel, matter)
+    }
+
+    /// The estimate from the photons in a region.
+    #[inline(always)]
+    fn within<S: Lanes, R: GatherRegion>(
+        &self,
+        simd: S,
+        at: &Gathering,
+        kernel: &R,
+        matter: &Matter,
+    ) -> Scattered {
         if matter.opacity <= 0.0 {
-            return Scattered::Plain(Rgb::BLACK);
+            return Scattered::Plain(Rgb::BLACK, None);
         }
-        let slope = matter.slope;
+        let (q, slope) = (self.grid.to_metric(at.position), matter.slope);
         let own = S::f32s::splat(simd, at.opacity);
         let one = S::f32s::splat(simd, 1.0);
         let mut sum = Sum::new(simd, at);
@@ -109,8 +175,12 @@ impl PhotonMap {
         }
         let light = sum.total() / (kernel.volume() * matter.opacity);
         // The quotient overflows single precision only in matter so thin that it is invisible.
-        let light = if light.is_finite() { light } else { Rgb::BLACK };
-        if let Scattering::Glossy = sum.kind { Scattered::Glossy(light) } else { Scattered::Plain(light) }
+        let light = if light.is_finite() { light * at.weight } else { Rgb::BLACK };
+        if let Scattering::Glossy = sum.kind {
+            Scattered::Glossy(light)
+        } else {
+            Scattered::Plain(light, None)
+        }
     }
 
     /// Photons from the `i`-th on, relative to a metric position.
@@ -144,6 +214,23 @@ impl PhotonMap {
         let (_, nth, _) = distances.select_nth_unstable_by(count - 1, f32::total_cmp);
         // Photons may be exactly at the position; a sphere must not be empty.
         nth.sqrt().max(1e-3)
+    }
+}
+
+impl Site {
+    /// Of a gather in a ball.
+    fn new(at: &Gathering, ball: &Ball, matter: &Matter) -> Self {
+        let (axis, share) = ball.flattening();
+        Self {
+            position: at.position,
+            weight: at.weight,
+            slope: matter.slope,
+            opacity: matter.opacity,
+            axis,
+            share,
+            normal: at.event.normal.unwrap_or(Vec3::ZERO),
+            q: if at.event.is_surface() { at.event.q } else { 0.0 },
+        }
     }
 }
 
