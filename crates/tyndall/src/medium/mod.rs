@@ -263,13 +263,19 @@ impl Medium {
         self.transfer.optics(self.volume.value(p))
     }
 
+    /// The scattering function where a surface with this normal has the share `q`.
+    #[inline]
+    pub(crate) fn event_at_surface(&self, optics: &Optics, normal: Option<Vec3>, q: f32) -> Event {
+        let surface =
+            Surface { albedo: optics.albedo, specular: optics.specular, roughness: optics.roughness };
+        Event { phase: self.phase, brdf: self.brdf, surface, normal, q }
+    }
+
     /// The scattering function at an index-space position; the gradient is read only where it matters.
     #[inline]
     #[must_use]
     pub fn event(&self, p: Vec3, optics: &Optics) -> Event {
-        let surface =
-            Surface { albedo: optics.albedo, specular: optics.specular, roughness: optics.roughness };
-        let mut event = Event { phase: self.phase, brdf: self.brdf, surface, normal: None, q: 0.0 };
+        let mut event = self.event_at_surface(optics, None, 0.0);
         if optics.surface > 0.0 {
             let Some(gradient) = self.volume.gradient(p) else { return event };
             let range = Binade::of(self.gradient_range);

@@ -3,7 +3,7 @@
 use super::gather::between_points;
 use super::segments::SeenChange;
 use super::stored::Photon;
-use super::{PhotonMapper, SegmentTile, cells_for, marks_for, plan, step};
+use super::{PhotonMapper, SegmentTile, cells_for, gather_memory, marks_for, plan, step};
 use crate::integrator::cells::ChangeMarks;
 use crate::integrator::history::{MovedBounds, Touched};
 use crate::integrator::light_paths::{Chunk, LightPaths, PathSource, sources};
@@ -59,6 +59,12 @@ impl PhotonMapper {
         let peaks_changed = peaks(old) != peaks(new);
         if difference.camera || difference.size || step_changed || peaks_changed {
             self.has_segments = false;
+        }
+        if difference.size {
+            // The tiles, of which there may be fewer, give back all memory.
+            let gathers: Vec<_> = tiles.iter_mut().flatten().map(SegmentTile::take_gathers).collect();
+            drop_elsewhere(gathers);
+            self.gather_memory = gather_memory(new, self.edit_memory);
         }
         for tile in tiles.iter_mut().flatten() {
             if self.has_segments {

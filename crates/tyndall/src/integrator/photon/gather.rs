@@ -29,17 +29,40 @@ pub(super) struct Gathering {
     pub w_out: Vec3,
     /// Length of the view ray that the position represents, world units.
     pub width: f32,
+    /// Share of its light that the viewer sees.
+    pub weight: f32,
     /// The ray's lane in its packet.
     pub lane: usize,
 }
 
-/// Light that a position scatters to the viewer, per unit extinction.
+/// Light that a position scatters to the viewer, times the share that the viewer sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Scattered {
-    /// To be multiplied by the albedo.
-    Plain(Rgb),
+    /// To be multiplied by the albedo; if it can be gathered again, with where that is.
+    Plain(Rgb, Option<GatherSite>),
     /// By a glossy surface, whose albedo is not a factor.
     Glossy(Rgb),
+}
+
+/// What a point estimate depends on besides photons and the optics at its position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct GatherSite {
+    /// Index space.
+    position: Vec3,
+    /// See [`Gathering::weight`].
+    weight: f32,
+    /// See [`Gathering::opacity`].
+    most_opacity: f32,
+    /// See [`Matter`].
+    slope: Vec3,
+    opacity: f32,
+    /// See [`Ball::flattening`].
+    axis: Vec3,
+    share: f32,
+    /// Zero where there is no surface.
+    normal: Vec3,
+    /// The share of the surface.
+    q: f32,
 }
 
 impl PhotonMap {
@@ -56,14 +79,26 @@ impl PhotonMap {
     ) -> Scattered {
         let (points, number) = (&self.points, number_of(at.position));
         match self.estimate {
-            Estimator::Point => self.within(simd, medium, at, Ball::new(1.0, number, points), notes),
+            Estimator::Point => {
+                let ball = Ball::new(1.0, number, points);
+                let (ball, matter) = self.fit(simd, medium, at, ball, notes);
+                match self.within(simd, at, &ball, &matter) {
+                    Scattered::Plain(light, _) => {
+                        Scattered::Plain(light, Some(GatherSite::new(at, &ball, &matter)))
+                    }
+                    glossy @ Scattered::Glossy(_) => glossy,
+                }
+            }
             Estimator::Nearest(count) => {
                 let radius = self.radius_of(simd, at, count as usize, distances);
-                self.within(simd, medium, at, Ball::new(radius, number, points), notes)
+                let ball = Ball::new(radius, number, points);
+                let (ball, matter) = self.fit(simd, medium, at, ball, notes);
+                self.within(simd, at, &ball, &matter)
             }
             Estimator::Beam => {
                 let slice = Slice::new(at.width / self.radius, -at.w_out, number, points);
-                self.within(simd, medium, at, slice, notes)
+                let (slice, matter) = self.fit(simd, medium, at, slice, notes);
+                self.within(simd, at, &slice, &matter)
             }
         }
     }
@@ -75,17 +110,47 @@ impl PhotonMap {
         if medium.may_peak_within(edges.max_element()) { medium.half_spread(position, edges) } else { 0.0 }
     }
 
-    /// The estimate from the photons in a region.
+    /// The light at a site with this data value, still to be multiplied by the albedo: equal to the last bit to that of
+    /// [`Self::scattered`].
     #[inline(always)]
-    fn within<S: Lanes, R: GatherRegion>(
+    pub fn scattered_again<S: Lanes>(
+        &self,
+        simd: S,
+        medium: &Medium,
+        site: &GatherSite,
+        value: f32,
+        w_out: Vec3,
+    ) -> Rgb {
+        let GatherSite { position, weight, most_opacity, slope, opacity, axis, share, normal, q } = *site;
+        let optics = medium.transfer().optics(value);
+        let event = medium.event_at_surface(&optics, (q > 0.0).then_some(normal), q);
+        let at = Gathering {
+            position,
+            opacity: most_opacity,
+            mean: most_opacity,
+            half_spread: 0.0,
+            event,
+            w_out,
+            width: 0.0,
+            weight,
+            lane: 0,
+        };
+        let matter = Matter { opacity, slope, lean: Vec3::ZERO };
+        match self.within(simd, &at, &Ball::flat(axis, share, &self.points), &matter) {
+            Scattered::Plain(light, _) | Scattered::Glossy(light) => light,
+        }
+    }
+
+    /// Fits the matter about a position, and a region to it.
+    #[inline(always)]
+    fn fit<S: Lanes, R: GatherRegion>(
         &self,
         simd: S,
         medium: &Medium,
         at: &Gathering,
         mut kernel: R,
         notes: &mut impl MarchNotes<S>,
-    ) -> Scattered {
-        let q = self.grid.to_metric(at.position);
+    ) -> (R, Matter) {
         let index = self.grid.index_per_metric();
         let mut matter = Matter::about(simd, medium, at, index, &kernel, notes);
         // The radius in world units, divided by the mean free path.
@@ -94,10 +159,22 @@ impl PhotonMap {
             kernel = kernel.flattened(axis, share);
             matter = Matter::about(simd, medium, at, index, &kernel, notes);
         }
+        (kernel, matter)
+    }
+
+    /// The estimate from the photons in a region.
+    #[inline(always)]
+    fn within<S: Lanes, R: GatherRegion>(
+        &self,
+        simd: S,
+        at: &Gathering,
+        kernel: &R,
+        matter: &Matter,
+    ) -> Scattered {
         if matter.opacity <= 0.0 {
-            return Scattered::Plain(Rgb::BLACK);
+            return Scattered::Plain(Rgb::BLACK, None);
         }
-        let slope = matter.slope;
+        let (q, slope) = (self.grid.to_metric(at.position), matter.slope);
         let own = S::f32s::splat(simd, at.opacity);
         let one = S::f32s::splat(simd, 1.0);
         let mut sum = Sum::new(simd, at);
@@ -121,8 +198,12 @@ impl PhotonMap {
         }
         let light = sum.total() / (kernel.volume() * matter.opacity);
         // The quotient overflows single precision only in matter so thin that it is invisible.
-        let light = if light.is_finite() { light } else { Rgb::BLACK };
-        if let Scattering::Glossy = sum.kind { Scattered::Glossy(light) } else { Scattered::Plain(light) }
+        let light = if light.is_finite() { light * at.weight } else { Rgb::BLACK };
+        if let Scattering::Glossy = sum.kind {
+            Scattered::Glossy(light)
+        } else {
+            Scattered::Plain(light, None)
+        }
     }
 
     /// Photons from the `i`-th on, relative to a metric position.
@@ -165,6 +246,24 @@ pub(super) fn between_points(grid: &CellGrid) -> Vec3 {
     const EDGE: f32 = 0.63;
     let rows = grid.index_per_metric().transpose();
     Vec3::new(rows.x_axis.length(), rows.y_axis.length(), rows.z_axis.length()) * EDGE
+}
+
+impl GatherSite {
+    /// Of a gather in a ball.
+    fn new(at: &Gathering, ball: &Ball, matter: &Matter) -> Self {
+        let (axis, share) = ball.flattening();
+        Self {
+            position: at.position,
+            weight: at.weight,
+            most_opacity: at.opacity,
+            slope: matter.slope,
+            opacity: matter.opacity,
+            axis,
+            share,
+            normal: at.event.normal.unwrap_or(Vec3::ZERO),
+            q: if at.event.is_surface() { at.event.q } else { 0.0 },
+        }
+    }
 }
 
 /// A pseudo-random number that depends on the position alone.

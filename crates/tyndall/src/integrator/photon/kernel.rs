@@ -48,6 +48,16 @@ impl<'a> Ball<'a> {
     pub fn new(radius: f32, number: usize, points: &'a Points) -> Self {
         Self { radius, flat: Flat::ROUND, frame: points.turns[number % TURNS], number, points }
     }
+
+    /// A ball of radius 1 that is compressed along an axis already; its points are not those of [`Self::flattened`].
+    pub fn flat(axis: Vec3, share: f32, points: &'a Points) -> Self {
+        Self { flat: Flat { axis, share }, ..Self::new(1.0, 0, points) }
+    }
+
+    /// The axis along which it is compressed, zero if there is none, and the share of its radius there.
+    pub fn flattening(&self) -> (Vec3, f32) {
+        (self.flat.axis, self.flat.share)
+    }
 }
 
 impl GatherRegion for Ball<'_> {

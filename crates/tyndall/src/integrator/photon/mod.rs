@@ -33,10 +33,11 @@ use super::{
     Edited, ItemChanges, KeptCount, KeptItems, Limits, MemoryNeed, Method, MethodReport, NamedCount,
     PixelCounts, Resources, SettingProblem, StageNames, Stop, Updated, WorkShare, drop_elsewhere,
 };
-use crate::film::{Film, Goal, Tile};
+use crate::film::{Goal, Tile};
 use crate::light::Enclosure;
 use crate::math::DVec3;
 use crate::scene::{Difference, Scene};
+use gathers::GatherMemory;
 use kernel::Slice;
 use map::{Lit, MapSettings, MapState, PhotonMap};
 use pass::Pass;
@@ -51,8 +52,10 @@ use view::View;
 pub struct PhotonMapper {
     settings: Settings,
     ground: Ground,
-    /// Bytes of gathers that may be kept.
-    gather_memory: usize,
+    /// For what is kept of gathers; `None` if nothing is kept.
+    gather_memory: Option<GatherMemory>,
+    /// Bytes that may be kept for edits.
+    edit_memory: usize,
     lights: Vec<LightPaths<Photon>>,
     /// Paths of the base map that are gone, with photons whose positions are yet to be marked.
     gone: Vec<Chunk<Photon>>,
@@ -76,16 +79,10 @@ impl PhotonMapper {
         let photon = size_of::<Photon>() as u64 + map::BYTES;
         let interactions = most_kept(max_scatter) * (2 * photon + 2 * history) as f64;
         let paths = f64::from(settings.photons) * (interactions + (16 + 2 * history) as f64);
-        let pixels = pixels(size);
+        let segments = u64::from(size[0]) * u64::from(size[1]) * u64::from(settings.segments);
         let segment = segment::BYTES + history + gathers::BYTES;
-        let segments = (pixels as u64).saturating_mul(u64::from(settings.segments));
-        let view = segments.saturating_mul(segment).saturating_add(gathers::most_bytes(pixels) as u64);
+        let view = segments.saturating_mul(segment).saturating_add(GatherMemory::most(size) as u64);
         crate::math::cast::whole(paths).saturating_add(view)
-    }
-
-    /// Bytes of a tile's gathers that may be kept.
-    fn gather_memory(&self, size: [u32; 2]) -> usize {
-        self.gather_memory.min(gathers::most_bytes(pixels(size))) / Film::tile_count(size)
     }
 
     /// Number of photons of the base map, once traced.
@@ -174,7 +171,8 @@ impl Method for PhotonMapper {
         Self {
             settings: *settings,
             ground: Ground { reading, enclosure, level: resources.level },
-            gather_memory: resources.edit_memory,
+            gather_memory: gather_memory(scene, resources.edit_memory),
+            edit_memory: resources.edit_memory,
             lights,
             gone: Vec::new(),
             map: MapState::Absent,
@@ -262,10 +260,11 @@ impl Method for PhotonMapper {
         let Ground { reading: Reading { groups, cells, .. }, level, .. } = &self.ground;
         let per_ray = self.settings.segments as usize;
         let segments = segments.get_or_insert_with(|| SegmentTile::new(per_ray, groups.count()));
-        segments.make_room(tile.pixel_count(), self.gather_memory(scene.size));
+        segments.make_room(tile.pixel_count(), self.gather_memory.is_some());
         let view = View { scene, map: self.map.ready(), step, gather_spacing };
         let positions = &self.marks;
-        level.run(GatherSegments { view, segments, tile, goal, groups, cells, positions, stop });
+        let memory = self.gather_memory.as_ref();
+        level.run(GatherSegments { view, segments, tile, goal, groups, cells, positions, memory, stop });
     }
 
     fn report(&self, tiles: &[Option<SegmentTile>], _: &PixelCounts) -> MethodReport {
@@ -283,7 +282,10 @@ impl Method for PhotonMapper {
             ],
             kept: self.kept_paths().into_iter().chain([segments_kept, gathers_kept]).collect(),
             items_computed: Some(traced + computed),
-            counts: vec![NamedCount { name: "gathers", count: sum(|tile| tile.computed.gathers) }],
+            counts: vec![
+                NamedCount { name: "gathers", count: sum(|tile| tile.computed.gathers) },
+                NamedCount { name: "marched", count: sum(|tile| tile.computed.marched) },
+            ],
             stages: StageNames { preparation: Some("photons"), sampling: "segments" },
         }
     }
@@ -344,9 +346,9 @@ fn marks_for(scene: &Scene, settings: &Settings) -> ChangeMarks {
     }
 }
 
-/// Number of pixels of a picture.
-fn pixels(size: [u32; 2]) -> usize {
-    size[0] as usize * size[1] as usize
+/// Memory for what is kept of gathers, out of so many bytes; `None` if there is none.
+fn gather_memory(scene: &Scene, bytes: usize) -> Option<GatherMemory> {
+    (bytes > 0).then(|| GatherMemory::new(scene.size, bytes))
 }
 
 /// Light paths and view-ray segments at one point in time.

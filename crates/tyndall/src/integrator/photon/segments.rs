@@ -1,6 +1,7 @@
 //! View rays divided into segments, each computed, kept and invalidated independently \[Jonsson12, sec. 4.3.2\].
 
-use super::gathers::{KeptGathers, LaneGathers};
+use super::gather::GatherSite;
+use super::gathers::{GatherMemory, Gathered, LaneGathers, SegmentLists, radiance};
 use super::segment::Segment;
 use super::view::{Notes, Stretches, View};
 use crate::film::{Goal, PixelSample, Tile};
@@ -8,7 +9,7 @@ use crate::integrator::cells::ChangeMarks;
 use crate::integrator::history::PackedHistories;
 use crate::integrator::view_march::OPAQUE;
 use crate::integrator::{ItemChanges, Stop};
-use crate::math::{Ray, Rgb, cast};
+use crate::math::{Ray, Rgb, Vec3, cast};
 use crate::medium::Track;
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes, MOST_LANES};
@@ -22,8 +23,8 @@ pub struct SegmentTile {
     segments: Vec<Segment>,
     /// Values that each segment read.
     histories: PackedHistories,
-    /// Of known segments.
-    gathers: KeptGathers,
+    /// What is kept of each known segment's gathers; `None` if nothing is kept.
+    gathers: Option<SegmentGathers>,
     /// Whether none is known, whatever they hold; their memory will be reused.
     forgotten: bool,
     /// What has changed since the segments were last invalidated; `None` without an edit.
@@ -31,6 +32,15 @@ pub struct SegmentTile {
     /// Number of pixels whose segments have been asked, if a stop interrupted that.
     asked: usize,
     pub(super) computed: SegmentCounts,
+}
+
+/// What is kept of the gathers of a tile's segments.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct SegmentGathers {
+    parts: SegmentLists<Gathered>,
+    sites: SegmentLists<GatherSite>,
+    /// Segments whose light must be gathered again before they are seen.
+    outdated: Vec<bool>,
 }
 
 /// Values whose change is visible along a view ray.
@@ -47,6 +57,8 @@ pub(super) struct SeenChange {
 pub(super) struct SegmentCounts {
     /// Number of segments computed.
     pub segments: usize,
+    /// Number of these that were marched; in the others, light was gathered where it had been.
+    pub marched: usize,
     /// Number of positions in them where photons were gathered.
     pub gathers: usize,
 }
@@ -58,7 +70,7 @@ impl SegmentTile {
             per_ray,
             segments: Vec::new(),
             histories: PackedHistories::new(groups),
-            gathers: KeptGathers::default(),
+            gathers: None,
             forgotten: true,
             changed: None,
             asked: 0,
@@ -72,15 +84,22 @@ impl SegmentTile {
         self.changed = None;
     }
 
-    /// Makes room for this many pixels if the segments were forgotten, and for as many bytes of their gathers.
-    pub fn make_room(&mut self, pixels: usize, bytes_of_gathers: usize) {
+    /// Makes room for this many pixels if the segments were forgotten.
+    pub fn make_room(&mut self, pixels: usize, keeps_gathers: bool) {
         if std::mem::take(&mut self.forgotten) {
             let count = pixels * self.per_ray;
-            self.gathers.reset(count, bytes_of_gathers);
             self.segments.clear();
             self.segments.resize(count, Segment::UNKNOWN);
             self.histories.resize(count);
+            if keeps_gathers {
+                self.gathers.get_or_insert_default().reset(count);
+            }
         }
+    }
+
+    /// Removes what is kept of gathers, with its memory; the segments must have been forgotten.
+    pub(super) fn take_gathers(&mut self) -> impl Send + use<> {
+        self.gathers.take()
     }
 
     /// Number of segments that are not forgotten.
@@ -95,12 +114,14 @@ impl SegmentTile {
 
     /// Number of their gathers that are kept.
     pub fn gathers(&self) -> usize {
-        self.gathers.len()
+        self.gathers.as_ref().map_or(0, |kept| kept.parts.len())
     }
 
     /// Size of these in bytes.
     pub fn bytes_of_gathers(&self) -> usize {
-        self.gathers.bytes()
+        self.gathers
+            .as_ref()
+            .map_or(0, |kept| kept.parts.bytes() + kept.sites.bytes() + size_of_val(&kept.outdated[..]))
     }
 
     /// Differences between its known segments and those known at another time; all are new if the number of segments
@@ -134,24 +155,31 @@ impl SegmentTile {
         self.changed.is_none()
     }
 
-    /// Invalidates the segments that the recorded changes touch, except that those of which only colours changed are
-    /// summed anew from their gathers; false if stopped first.
+    /// Applies the recorded changes to the segments that they touch: what cannot be computed from their gathers is no
+    /// longer known. False if stopped first.
     fn invalidate(&mut self, view: &View, tile: &Tile, positions: &ChangeMarks, stop: &Stop) -> bool {
         let Some(changed) = self.changed else { return true };
+        let mut near = vec![false; self.per_ray];
         for pixel in tile.positions(self.asked..tile.pixel_count()) {
-            let first = self.asked * self.per_ray;
-            let of_ray = first..first + self.per_ray;
+            let of_ray = self.asked * self.per_ray..(self.asked + 1) * self.per_ray;
             for i in of_ray.clone() {
-                if positions.everywhere() || self.histories.get(i).meets(changed.matter) {
+                if self.histories.get(i).meets(changed.matter) {
                     self.segments[i] = Segment::UNKNOWN;
                 }
             }
-            let segments = &mut self.segments[of_ray.clone()];
-            if positions.any() && segments.iter().any(Segment::is_known) {
-                forget_near(view, pixel, positions, segments);
+            near.fill(positions.everywhere());
+            let segments = &self.segments[of_ray.clone()];
+            if !positions.everywhere() && positions.any() && segments.iter().any(Segment::is_known) {
+                find_near(view, pixel, positions, segments, &mut near);
             }
-            for i in of_ray {
-                self.recolor(i, view, changed.colors);
+            for (i, &near) in of_ray.zip(&near) {
+                let recolored = self.histories.get(i).meets(changed.colors);
+                if self.segments[i].is_known() && !self.is_mended(i, near, recolored, view) {
+                    self.segments[i] = Segment::UNKNOWN;
+                }
+                if let Some(kept) = self.gathers.as_mut().filter(|_| !self.segments[i].is_known()) {
+                    kept.forget(i);
+                }
             }
             self.asked += 1;
             if stop.reached() {
@@ -162,16 +190,44 @@ impl SegmentTile {
         true
     }
 
-    /// Sums a segment's light anew if it met any of these values; it is then no longer known if its gathers are not.
-    fn recolor(&mut self, i: usize, view: &View, colors: Historygram) {
-        if self.segments[i].is_known() && self.histories.get(i).meets(colors) {
-            match self.gathers.radiance(i, view.scene.medium.transfer()) {
-                Some(radiance) => self.segments[i].radiance = radiance.to_array(),
-                None => self.segments[i] = Segment::UNKNOWN,
-            }
+    /// Sums the light of a known segment anew, or lets it be gathered again; false if too little of its gathers is kept.
+    fn is_mended(&mut self, i: usize, near: bool, recolored: bool, view: &View) -> bool {
+        if !near && !recolored {
+            return true;
         }
-        if !self.segments[i].is_known() {
-            self.gathers.forget(i);
+        let Some(kept) = &mut self.gathers else { return false };
+        let Some(parts) = kept.parts.get(i) else { return false };
+        if near {
+            kept.outdated[i] = kept.sites.get(i).is_some();
+            return kept.outdated[i];
+        }
+        self.segments[i].radiance = radiance(parts, view.scene.medium.transfer()).to_array();
+        true
+    }
+
+    /// Gathers light again in the visible segments of a ray where photons changed; all these are known.
+    #[inline(always)]
+    fn gather_again<S: Lanes>(&mut self, simd: S, view: &View, ray: usize, w_out: Vec3) {
+        let (Some(kept), Some(map)) = (&mut self.gathers, view.map) else { return };
+        let medium = &*view.scene.medium;
+        let mut transmittance = 1.0;
+        for i in ray * self.per_ray..(ray + 1) * self.per_ray {
+            if transmittance < OPAQUE {
+                break;
+            }
+            transmittance *= self.segments[i].transmittance();
+            if !std::mem::take(&mut kept.outdated[i]) {
+                continue;
+            }
+            if let (Some(parts), Some(sites)) = (kept.parts.get_mut(i), kept.sites.get(i)) {
+                // Emitted light comes last and has no site.
+                for (part, site) in parts.iter_mut().zip(sites) {
+                    part.light = map.scattered_again(simd, medium, site, part.value, w_out);
+                }
+                self.segments[i].radiance = radiance(parts, medium.transfer()).to_array();
+                self.computed.segments += 1;
+                self.computed.gathers += sites.len();
+            }
         }
     }
 
@@ -217,6 +273,27 @@ impl SegmentTile {
     }
 }
 
+impl SegmentGathers {
+    fn reset(&mut self, segments: usize) {
+        self.parts.reset(segments);
+        self.sites.reset(segments);
+        self.outdated.clear();
+        self.outdated.resize(segments, false);
+    }
+
+    fn forget(&mut self, segment: usize) {
+        self.parts.forget(segment);
+        self.sites.forget(segment);
+        self.outdated[segment] = false;
+    }
+
+    /// Keeps what a lane gathered along a segment, as far as there is memory.
+    fn keep(&mut self, segment: usize, gathers: &LaneGathers, lane: usize, memory: &GatherMemory) {
+        self.parts.set(segment, gathers.parts(lane), &memory.parts);
+        self.sites.set(segment, gathers.sites(lane), &memory.sites);
+    }
+}
+
 /// The range of a segment's steps: a ray's steps are divided evenly among its segments.
 fn steps_of(segment: usize, per_ray: usize, count: i32) -> [i32; 2] {
     let border = |segment: usize| {
@@ -251,8 +328,8 @@ fn ray_of(scene: &Scene, [x, y]: [u32; 2]) -> (Ray, Track) {
     (ray, scene.medium.track(&ray, f32::INFINITY))
 }
 
-/// Invalidates the segments of a ray that gather where photons changed.
-fn forget_near(view: &View, pixel: [u32; 2], positions: &ChangeMarks, segments: &mut [Segment]) {
+/// Finds the known segments of a ray that gather where photons changed.
+fn find_near(view: &View, pixel: [u32; 2], positions: &ChangeMarks, segments: &[Segment], near: &mut [bool]) {
     let medium = &*view.scene.medium;
     let (_, track) = ray_of(view.scene, pixel);
     let count = track.steps(view.step);
@@ -265,9 +342,9 @@ fn forget_near(view: &View, pixel: [u32; 2], positions: &ChangeMarks, segments: 
         let first = cast::truncate(cell.start / view.step - 1.0).max(0);
         let last = cast::truncate(cell.end / view.step + 1.0).min(count - 1);
         for k in first..=last {
-            let segment = &mut segments[segment_of(k, segments.len(), count)];
-            if segment.is_known() && positions.near(track.step_ends(k, view.step).map(|t| track.at(t))) {
-                *segment = Segment::UNKNOWN;
+            let i = segment_of(k, segments.len(), count);
+            if !near[i] && segments[i].is_known() {
+                near[i] = positions.near(track.step_ends(k, view.step).map(|t| track.at(t)));
             }
         }
     }
@@ -283,6 +360,8 @@ pub(super) struct GatherSegments<'a> {
     pub groups: &'a HistoryGroups,
     pub cells: &'a [Historygram],
     pub positions: &'a ChangeMarks,
+    /// For what is kept of gathers; `None` if nothing is kept.
+    pub memory: Option<&'a GatherMemory>,
     pub stop: &'a Stop<'a>,
 }
 
@@ -291,7 +370,7 @@ impl Kernel for GatherSegments<'_> {
 
     #[inline(always)]
     fn run<S: Lanes>(self, simd: S) {
-        let Self { view, segments, tile, goal, groups, cells, positions, stop } = self;
+        let Self { view, segments, tile, goal, groups, cells, positions, memory, stop } = self;
         if !segments.invalidate(&view, tile, positions, stop) {
             return;
         }
@@ -330,15 +409,24 @@ impl Kernel for GatherSegments<'_> {
                     let steps = [stretches.from[lane], stretches.to[lane]];
                     segments.segments[numbers[lane]] = Segment::new(&found[lane], ends(steps, view.step));
                     segments.histories.set(numbers[lane], notes.read[lane]);
-                    segments.gathers.set(numbers[lane], notes.gathers.of(lane));
+                    if let (Some(kept), Some(memory)) = (&mut segments.gathers, memory) {
+                        kept.keep(numbers[lane], notes.gathers, lane, memory);
+                    }
                     segments.computed.gathers += found[lane].gathers;
                 }
                 segments.computed.segments += packet.len();
+                segments.computed.marched += packet.len();
                 if stop.reached_now() {
                     return;
                 }
             }
             lacking.retain(|&ray| segments.missing(ray).is_some());
+        }
+        for (ray, (world, _)) in turn.clone().zip(&rays) {
+            segments.gather_again(simd, &view, ray, -world.direction);
+            if stop.reached() {
+                return;
+            }
         }
         for (ray, of_ray) in turn.zip(&rays) {
             tile.add(&segments.composite(&view, ray, of_ray));

@@ -1,6 +1,6 @@
 //! View rays through matter lit by photons \[Jonsson12, eq. 2\]: packets of ray segments.
 
-use super::gather::{Gathering, Scattered};
+use super::gather::{GatherSite, Gathering, Scattered};
 use super::gathers::{Gathered, LaneGathers};
 use super::map::PhotonMap;
 use crate::integrator::view_march::{Coverage, Shader, composite};
@@ -66,13 +66,25 @@ pub(super) struct Stretch {
 
 /// Listener to a march that gathers photons.
 pub(super) trait GatherNotes<S: Lanes>: MarchNotes<S> {
-    /// Part of the radiance of a lane's ray; `None` if an albedo is in it, but not as a factor.
-    fn gathered(&mut self, lane: usize, light: Option<Gathered>);
+    /// Part of the light of a lane's ray, and where it was gathered if it can be gathered again.
+    fn gathered(&mut self, lane: usize, part: Gathered, site: Option<GatherSite>);
+
+    /// There is light of a glossy surface.
+    fn glossy(&mut self, lane: usize);
+
+    /// Light that all matter along a lane's ray emits, at the end.
+    fn emitted(&mut self, lane: usize, light: Rgb);
 }
 
 impl<S: Lanes> GatherNotes<S> for () {
     #[inline(always)]
-    fn gathered(&mut self, _: usize, _: Option<Gathered>) {}
+    fn gathered(&mut self, _: usize, _: Gathered, _: Option<GatherSite>) {}
+
+    #[inline(always)]
+    fn glossy(&mut self, _: usize) {}
+
+    #[inline(always)]
+    fn emitted(&mut self, _: usize, _: Rgb) {}
 }
 
 impl View<'_> {
@@ -107,7 +119,7 @@ impl View<'_> {
             let transmittance = 1.0 - seen.alpha.as_slice()[lane];
             let depth = seen.depth.as_slice()[lane];
             // Last, so that the sum of all that was noted has the same bits.
-            notes.gathered(lane, Some(Gathered::emitted(emitted[lane])));
+            notes.emitted(lane, emitted[lane]);
             let radiance = scattered[lane] + emitted[lane];
             found[lane] = Stretch { radiance, transmittance, depth, gathers: gathers[lane] };
         }
@@ -138,16 +150,15 @@ impl View<'_> {
             let ends = [S::f32s::splat(simd, ends[0]), S::f32s::splat(simd, ends[1])];
             notes.values_between_about(simd, lane, first, ends);
         }
-        let at = Gathering { position, opacity, mean, half_spread, event, w_out, width, lane };
+        let at = Gathering { position, opacity, mean, half_spread, event, w_out, width, weight, lane };
         match map.scattered(simd, medium, &at, distances, notes) {
-            Scattered::Plain(light) => {
-                let light = light * weight;
-                notes.gathered(lane, Some(Gathered::scattered(light, value)));
+            Scattered::Plain(light, site) => {
+                notes.gathered(lane, Gathered { light, value }, site);
                 light * optics.albedo
             }
             Scattered::Glossy(light) => {
-                notes.gathered(lane, None);
-                light * weight
+                notes.glossy(lane);
+                light
             }
         }
     }
@@ -232,8 +243,18 @@ pub(super) struct Notes<'a> {
 
 impl<S: Lanes> GatherNotes<S> for Notes<'_> {
     #[inline(always)]
-    fn gathered(&mut self, lane: usize, light: Option<Gathered>) {
-        self.gathers.add(lane, light);
+    fn gathered(&mut self, lane: usize, part: Gathered, site: Option<GatherSite>) {
+        self.gathers.add(lane, part, site);
+    }
+
+    #[inline(always)]
+    fn glossy(&mut self, lane: usize) {
+        self.gathers.add_glossy(lane);
+    }
+
+    #[inline(always)]
+    fn emitted(&mut self, lane: usize, light: Rgb) {
+        self.gathers.add_emitted(lane, light);
     }
 }
 
