@@ -126,10 +126,10 @@ fn a_peak_between_two_samples_is_lit_as_by_path() {
         (seen_from_aslant(200.0, -500.0, 6.0), "exact", 0.02),
         (seen_from_aslant(40.0, -500.0, 120.0), "exact", 0.03),
         (seen_from_aslant(10.0, -980.0, 6.0), "exact", 0.02),
-        // Thin enough that shadows are cached.
-        (seen_from_aslant(10.0, -500.0, 1.0), "cached", 0.03),
-        (seen_from_aslant(40.0, -500.0, 1.0), "cached", 0.03),
-        (seen_from_aslant(200.0, -500.0, 1.0), "cached", 0.03),
+        // Thin enough that shadows are cached, in texels wider than the shell: light that grazes it meets less of it.
+        (seen_from_aslant(10.0, -500.0, 3.0), "cached", 0.05),
+        (seen_from_aslant(40.0, -500.0, 3.0), "cached", 0.05),
+        (seen_from_aslant(200.0, -500.0, 3.0), "cached", 0.02),
     ] {
         let Peak { width, middle, density, .. } = peak;
         let look = lit(peak.look(1.0, 0.0));
