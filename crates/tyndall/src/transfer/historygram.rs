@@ -92,6 +92,8 @@ pub struct HistoryGroups {
     /// The group of each value bin.
     groups: Vec<u8>,
     count: u8,
+    /// What reading a value in each bin records, and last nothing.
+    records: Vec<Historygram>,
 }
 
 impl HistoryGroups {
@@ -109,7 +111,9 @@ impl HistoryGroups {
             }
             Grouping::Quantile => equal_counts(&volume.value_bin_histogram().counts, count),
         };
-        Self { groups, count }
+        let records =
+            groups.iter().map(|&group| Historygram(1 << group)).chain([Historygram::EMPTY]).collect();
+        Self { groups, count, records }
     }
 
     /// How many groups there are at most.
@@ -122,6 +126,12 @@ impl HistoryGroups {
     #[must_use]
     pub fn of_bins(&self) -> &[u8] {
         &self.groups
+    }
+
+    /// What reading a value in each bin records in a history; one more, for no bin, is empty.
+    #[must_use]
+    pub fn records(&self) -> &[Historygram] {
+        &self.records
     }
 
     /// What reading a value in a bin records in a history.

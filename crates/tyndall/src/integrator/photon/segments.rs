@@ -403,7 +403,8 @@ impl Kernel for GatherSegments<'_> {
                 let bins = view.scene.medium.transfer().bins();
                 gathers.clear();
                 let read = [Historygram::EMPTY; MOST_LANES];
-                let mut notes = Notes { groups, bins, cells, read, gathers: &mut gathers };
+                let mut notes =
+                    Notes { groups, records: groups.records(), bins, cells, read, gathers: &mut gathers };
                 let found = view.march(simd, &stretches, &mut notes);
                 for lane in 0..packet.len() {
                     let steps = [stretches.from[lane], stretches.to[lane]];

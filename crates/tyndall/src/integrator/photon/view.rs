@@ -4,7 +4,7 @@ use super::gather::{GatherSite, Gathering, Scattered};
 use super::gathers::{Gathered, LaneGathers};
 use super::map::PhotonMap;
 use crate::integrator::view_march::{Coverage, Shader, composite};
-use crate::math::{Ray, Rgb, Vec3};
+use crate::math::{Ray, Rgb, Vec3, cast};
 use crate::medium::{MarchNotes, PacketMarch, PacketSample, Track};
 use crate::scene::Scene;
 use crate::simd::{Lanes, MOST_LANES};
@@ -234,11 +234,22 @@ struct ViewSample {
 /// Records what each lane's ray segment reads and gathers.
 pub(super) struct Notes<'a> {
     pub groups: &'a HistoryGroups,
+    /// See [`HistoryGroups::records`].
+    pub records: &'a [Historygram],
     pub bins: ValueBins,
     /// For each majorant cell, the groups of values that can occur in it.
     pub cells: &'a [Historygram],
     pub read: [Historygram; MOST_LANES],
     pub gathers: &'a mut LaneGathers,
+}
+
+impl Notes<'_> {
+    /// The bins of values, and that of nothing in lanes that read none.
+    #[inline(always)]
+    fn bins_read<S: Lanes>(&self, simd: S, read: S::mask32s, values: S::f32s) -> S::i32s {
+        let nothing = cast::fit_u32(ValueBins::COUNT).cast_signed();
+        read.select(self.bins.bin_lanes(simd, values), S::i32s::splat(simd, nothing))
+    }
 }
 
 impl<S: Lanes> GatherNotes<S> for Notes<'_> {
@@ -276,12 +287,12 @@ impl<S: Lanes> MarchNotes<S> for Notes<'_> {
 
     #[inline(always)]
     fn values_about(&mut self, simd: S, lane: usize, read: S::mask32s, values: S::f32s) {
-        let bin = self.bins.bin_lanes(simd, values);
-        let read = read.select(S::i32s::splat(simd, 1), S::i32s::splat(simd, 0));
-        for (&bin, &read) in bin.as_slice().iter().zip(read.as_slice()) {
-            let group = self.groups.of_bins()[bin.cast_unsigned() as usize];
-            self.read[lane] |= Historygram::from_bits(u128::from(read.cast_unsigned()) << group);
+        let bins = self.bins_read(simd, read, values);
+        let mut all = Historygram::EMPTY;
+        for i in 0..S::WIDTH {
+            all |= self.records[bins.as_slice()[i].cast_unsigned() as usize];
         }
+        self.read[lane] |= all;
     }
 
     #[inline(always)]
