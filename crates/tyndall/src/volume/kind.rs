@@ -1,26 +1,26 @@
 //! What kind of data a volume holds, told from its values.
 
-use super::{Volume, Voxels, hounsfield, labels};
+use super::{Volume, Voxels, computed_once, hounsfield, labels};
 
 impl Volume {
     /// Whether the data are computed tomography in Hounsfield units: they lie in anatomical space and have a peak of air at
     /// -1000.
     #[must_use]
     pub fn is_ct(&self) -> bool {
-        *self.statistics.is_ct.get_or_init(|| hounsfield::is_ct(self))
+        *computed_once(&self.statistics.is_ct, || hounsfield::is_ct(self))
     }
 
     /// The values other than 0, ascending, of data of whole numbers from 0; `None` if there are other numbers, or more than 200 of these.
     #[must_use]
     pub fn whole_values(&self) -> Option<&[f64]> {
-        self.statistics.whole_values.get_or_init(|| labels::whole_values(self)).as_deref()
+        computed_once(&self.statistics.whole_values, || labels::whole_values(self)).as_deref()
     }
 
     /// The labels, ascending, of a segmentation: [`Self::whole_values`], at least two, of parts that most voxels lie inside of.
     #[must_use]
     pub fn labels(&self) -> Option<&[f64]> {
         let values = self.whole_values()?;
-        let are_labels = *self.statistics.are_labels.get_or_init(|| labels::are_labels(self, values));
+        let are_labels = *computed_once(&self.statistics.are_labels, || labels::are_labels(self, values));
         are_labels.then_some(values)
     }
 
@@ -77,5 +77,34 @@ impl Volume {
             }
         };
         self.bricks.fold(start, take, merge)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::{Grid, ValueMap};
+    use std::sync::mpsc;
+    use std::time::Duration;
+
+    #[test]
+    fn many_that_ask_at_once_on_one_pool_get_an_answer() {
+        let (done, wait) = mpsc::channel();
+        std::thread::spawn(move || {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(4).build().expect("threads");
+            for _ in 0..200 {
+                let voxels = Voxels::U8((0..64_u32.pow(3)).map(|i| i.to_le_bytes()[0] % 4).collect());
+                let grid = Grid::centred([64; 3], [1.0; 3]).expect("a grid");
+                let volume =
+                    pool.install(|| Volume::new(grid, voxels, ValueMap::IDENTITY).expect("a volume"));
+                pool.scope(|scope| {
+                    for _ in 0..16 {
+                        scope.spawn(|_| assert_eq!(volume.whole_values(), Some(&[1.0, 2.0, 3.0][..])));
+                    }
+                });
+            }
+            done.send(()).expect("a listener");
+        });
+        assert_eq!(wait.recv_timeout(Duration::from_secs(120)), Ok(()), "threads wait for each other");
     }
 }

@@ -118,6 +118,18 @@ struct Statistics {
     cells: Mutex<BTreeMap<usize, Arc<Cells>>>,
 }
 
+/// What a cell holds, computed first if it is empty. Not by `get_or_init`, which would wait for itself: a thread of a pool that
+/// computes in parallel may take up other work of the pool meanwhile, which may need the same.
+fn computed_once<T>(cell: &OnceLock<T>, compute: impl FnOnce() -> T) -> &T {
+    match cell.get() {
+        Some(kept) => kept,
+        None => {
+            let computed = compute();
+            cell.get_or_init(|| computed)
+        }
+    }
+}
+
 impl Volume {
     /// Cuts the samples into bricks, replaces what is not finite (see [`Self::non_finite`]), and derives
     /// the ranges, in parallel on the current thread pool.
@@ -316,13 +328,13 @@ impl Volume {
     pub fn robust_histogram(&self) -> &Histogram {
         /// Fine enough to set a threshold, coarse enough for every bin to mean something.
         const BINS: usize = 256;
-        self.statistics.robust.get_or_init(|| self.histogram(self.robust_range, BINS))
+        computed_once(&self.statistics.robust, || self.histogram(self.robust_range, BINS))
     }
 
     /// The histogram over the inner [`ValueBins`], all but the outermost two.
     #[must_use]
     pub fn value_bin_histogram(&self) -> &Histogram {
-        self.statistics.value_bins.get_or_init(|| {
+        computed_once(&self.statistics.value_bins, || {
             let bins = self.value_bins();
             let ends = [1.0, (ValueBins::COUNT - 1) as f32].map(|border| f64::from(bins.value(border)));
             self.histogram(ends, ValueBins::INSIDE)

@@ -224,7 +224,7 @@ mod tests {
     fn segments_have_their_own_lists() {
         const SEGMENTS: usize = 40;
         let mut random = SplitMix::new(3);
-        for bytes in [0, 100, 4000, 16_000, 1 << 20] {
+        for bytes in [0, 100, 4000, 8000, 1 << 20] {
             let room = Room(AtomicUsize::new(bytes));
             let mut kept = SegmentLists::default();
             kept.reset(SEGMENTS);
