@@ -325,8 +325,11 @@ impl<'a, S: Lanes> PacketMarch<'a, S> {
         while self.active.any_true() {
             let k = self.k;
             let start = k.to_float::<S::f32s>() * self.width;
-            let width = k.simd_lt(self.whole).select(S::f32s::splat(simd, self.width), self.rest);
-            let to = at::<S>(self.origin, self.direction, start + width);
+            let is_whole = k.simd_lt(self.whole);
+            let width = is_whole.select(S::f32s::splat(simd, self.width), self.rest);
+            // As where the next step starts, to the last bit: a march that resumes there reads the same.
+            let end = is_whole.select((k + 1).to_float::<S::f32s>() * self.width, start + self.rest);
+            let to = at::<S>(self.origin, self.direction, end);
             let mut here = self.active;
             self.k = k + 1;
             if self.occupied == 0 && self.skips {

@@ -65,6 +65,7 @@ fn path_with_one_scattering() {
 fn raymarch_and_the_order_of_its_step_error() {
     // Steps are in units of the cube root of the voxel's volume, which is large for this wide slab.
     let voxel = 1e5_f64.powf(2.0 / 3.0);
+    let mut worst = 0.0_f64;
     for case in &CASES {
         let scene = case.scene();
         let error = |steps: f64| {
@@ -78,8 +79,11 @@ fn raymarch_and_the_order_of_its_step_error() {
         let (coarse, fine) = (error(32.0), error(256.0));
         // 8 times finer steps: about 64 times less error, plus single-precision rounding.
         assert!(fine.abs() < coarse.abs() / 30.0 + 2e-5, "error {coarse:e} at 1/32, {fine:e} at 1/256");
-        assert!(coarse.abs() < 0.02 && coarse.abs() > 1e-6, "error {coarse:e} at 1/32");
+        assert!(coarse.abs() < 0.02, "error {coarse:e} at 1/32");
+        worst = worst.max(coarse.abs());
     }
+    // Where a step is seen half of what is visible of it, some cases have no error that shows.
+    assert!(worst > 1e-5, "errors of at most {worst:e} at 1/32 show no order");
 }
 
 /// What arrives along a ray with cached shadows, which only pictures have.

@@ -1,5 +1,6 @@
 //! The radiance estimate from photons around a position \[Jonsson12, eq. 8\].
 
+use super::gathering::Gathering;
 use super::kernel::{Ball, GatherRegion, Slice};
 use super::map::PhotonMap;
 use super::matter::Matter;
@@ -12,28 +13,6 @@ use crate::simd::{Lanes, unpack_directions};
 use fearless_simd::prelude::*;
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::ops::Range;
-
-/// A gather: its position and viewing direction.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Gathering {
-    /// Index space.
-    pub position: Vec3,
-    /// Opacity there, the largest within the spread of values; positive up to rounding.
-    pub opacity: f32,
-    /// The mean within the spread of values.
-    pub mean: f32,
-    /// See [`PhotonMap::half_spread`].
-    pub half_spread: f32,
-    pub event: Event,
-    /// Towards the viewer.
-    pub w_out: Vec3,
-    /// Length of the view ray that the position represents, world units.
-    pub width: f32,
-    /// Share of its light that the viewer sees.
-    pub weight: f32,
-    /// The ray's lane in its packet.
-    pub lane: usize,
-}
 
 /// Light that a position scatters to the viewer, times the share that the viewer sees.
 #[derive(Clone, Copy, Debug, PartialEq)]

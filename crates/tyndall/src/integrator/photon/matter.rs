@@ -13,7 +13,7 @@
 //! Matter denser than at the position counts as if it had the density at the position, and its photons are scaled down
 //! accordingly. Otherwise a dense neighbour that the points miss would light up all the thin matter around it.
 
-use super::gather::Gathering;
+use super::gathering::Gathering;
 use super::kernel::GatherRegion;
 use crate::math::{Mat3, Vec3};
 use crate::medium::{MarchNotes, Medium};

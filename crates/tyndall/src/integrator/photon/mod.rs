@@ -11,6 +11,7 @@
 
 mod edit;
 mod gather;
+mod gathering;
 mod gathers;
 mod kernel;
 mod map;

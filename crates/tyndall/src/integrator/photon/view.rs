@@ -1,6 +1,7 @@
 //! View rays through matter lit by photons \[Jonsson12, eq. 2\]: packets of ray segments.
 
-use super::gather::{GatherSite, Gathering, Scattered};
+use super::gather::{GatherSite, Scattered};
+use super::gathering::Gathering;
 use super::gathers::{Gathered, LaneGathers};
 use super::map::PhotonMap;
 use crate::integrator::view_march::{Coverage, Shader, composite};
