@@ -103,10 +103,12 @@ fn a_fill_value_however_far_away_changes_nothing() {
     let filled = |fill: f64, way: Way, function: &Value| {
         let data = Data::new(16, |p| if body(p) > 0.0 { body(p) } else { fill });
         folder.put("a.nrrd", data.nrrd("float"));
+        // The points that `photon` looks at follow the bits of positions, which values at the border of data change.
+        let samples = if way.method == "photon" { 128 } else { 16 };
         picture(
             &folder,
             "a.nrrd",
-            &json!({ "transfer_function": function, "medium": { "density": 0.5 } }),
+            &json!({ "transfer_function": function, "medium": { "density": 0.5 }, "render": { "samples": samples } }),
             way,
         )
     };
