@@ -244,26 +244,6 @@ fn shells(value: &mut Value) {
     value["render"]["photon"] = json!({ "photons": 60_000, "segments": 20 });
 }
 
-/// Gathers look for matter in all values that spread about them, also in those that no step of a view ray meets.
-#[test]
-fn values_that_spread_about_gathers() {
-    let mut value = Value::Null;
-    shells(&mut value);
-    let point = |value: f64, opacity: f64| json!({ "value": value, "opacity": opacity });
-    // Hidden in the ball, behind what is opaque.
-    let points = |opacity: f64| {
-        json!([
-            point(0.3, 0.0),
-            point(0.31, 0.2),
-            point(0.32, 0.0),
-            point(0.42, 0.0),
-            point(0.425, opacity),
-            point(0.43, 0.0)
-        ])
-    };
-    assert_each_changes_some(&mut value, points, [0.5, 0.6, 0.0, 0.3]);
-}
-
 /// A function with narrow peaks has gathers look for matter in another way, even far from the peak.
 #[test]
 fn peaks_that_come_and_go() {
