@@ -1,6 +1,6 @@
 //! Which light paths, photons and segments remain valid after an edit.
 
-use super::gather::between_points;
+use super::gather::{NARROW, between_points};
 use super::segments::SeenChange;
 use super::stored::Photon;
 use super::{PhotonMapper, SegmentTile, cells_for, gather_memory, marks_for, plan, step};
@@ -53,7 +53,7 @@ impl PhotonMapper {
         }
         let peaks = |scene: &Scene| {
             let edges = between_points(&cells_for(scene, &self.settings, self.settings.radius));
-            scene.medium.may_peak_within(edges.max_element())
+            scene.medium.may_peak_within(NARROW * edges.max_element())
         };
         // Gathers then look for matter in another way.
         let peaks_changed = peaks(old) != peaks(new);

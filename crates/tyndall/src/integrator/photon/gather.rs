@@ -86,7 +86,11 @@ impl PhotonMap {
     /// so slowly with the value that points stand for what is between them.
     pub fn half_spread(&self, medium: &Medium, position: Vec3) -> f32 {
         let edges = between_points(&self.grid);
-        if medium.may_peak_within(edges.max_element()) { medium.half_spread(position, edges) } else { 0.0 }
+        if medium.may_peak_within(NARROW * edges.max_element()) {
+            medium.half_spread(position, edges)
+        } else {
+            0.0
+        }
     }
 
     /// The light at a site with this data value, still to be multiplied by the albedo: equal to the last bit to that of
@@ -218,6 +222,9 @@ impl PhotonMap {
         nth.sqrt().max(1e-3)
     }
 }
+
+/// Share of the distance between points below which a peak of opacity is so narrow that they miss it: of wider ones they see enough.
+pub(super) const NARROW: f32 = 0.25;
 
 /// Distances in voxels, along each axis of index space, between the points that look for matter in a region.
 pub(super) fn between_points(grid: &CellGrid) -> Vec3 {
