@@ -124,7 +124,8 @@ fn a_peak_between_two_samples_is_lit_as_by_path() {
     for (peak, shadows, within) in [
         (seen_from_aslant(10.0, -500.0, 6.0), "exact", 0.02),
         (seen_from_aslant(200.0, -500.0, 6.0), "exact", 0.02),
-        (seen_from_aslant(40.0, -500.0, 120.0), "exact", 0.03),
+        // Dense: steps are lit at two sites.
+        (seen_from_aslant(40.0, -500.0, 120.0), "exact", 0.013),
         (seen_from_aslant(10.0, -980.0, 6.0), "exact", 0.02),
         // Thin enough that shadows are cached, in texels wider than the shell: light that grazes it meets less of it.
         (seen_from_aslant(10.0, -500.0, 3.0), "cached", 0.05),

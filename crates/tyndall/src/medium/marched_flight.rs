@@ -2,6 +2,7 @@
 //! collision after the matter has changed.
 
 use super::march::Steps;
+use super::step_ends::STEADY;
 use super::{Medium, Track};
 use crate::math::{Vec3, cast};
 
@@ -39,8 +40,8 @@ impl Medium {
             if cell.most <= 0.0 {
                 continue;
             }
-            k = k.max(cast::truncate(cell.start / step)).min(steps.count());
-            while k < steps.count() && k as f32 * step < cell.end {
+            k = k.max(cast::truncate(cell.start / step)).min(steps.count);
+            while k < steps.count && k as f32 * step < cell.end {
                 let [start, width] = steps.at(k, step);
                 let sigma_t = self.mean_sigma_t([track.at(start), track.at(start + width)]);
                 let behind = met + sigma_t * width;
@@ -65,5 +66,34 @@ impl Medium {
     #[must_use]
     pub fn mean_sigma_t(&self, ends: [Vec3; 2]) -> f32 {
         self.density * self.mean_opacity(ends)
+    }
+
+    /// Mean opacity between two positions in index space, by the rule of [`StepEnds`](super::step_ends::StepEnds); the plain mean of the two where voxels
+    /// are not interpolated.
+    fn mean_opacity(&self, [from, to]: [Vec3; 2]) -> f32 {
+        let values = [from, to].map(|p| self.volume.value(p));
+        let opacities = values.map(|value| self.transfer.opacity(value));
+        if !self.interpolates {
+            return 0.5 * (opacities[0] + opacities[1]);
+        }
+        let mean = self.transfer.mean_opacity(values);
+        let most = mean.max(opacities[0]).max(opacities[1]);
+        let least = mean.min(opacities[0]).min(opacities[1]);
+        if most <= least * STEADY || self.transfer.is_edge(values) {
+            return mean;
+        }
+        let way = to - from;
+        let border = |x: f32, way: f32| if way >= 0.0 { x.floor() + 1.0 } else { x.ceil() - 1.0 };
+        let crossing =
+            |x: f32, way: f32| Some((border(x, way) - x) / way).filter(|&s| s < 1.0).unwrap_or(1.0);
+        let mut shares = [crossing(from.x, way.x), crossing(from.y, way.y), crossing(from.z, way.z)];
+        shares.sort_by(f32::total_cmp);
+        let (mut before, mut share, mut mean) = (values[0], 0.0, 0.0);
+        for here in shares.into_iter().chain([1.0]) {
+            let value = self.volume.value(from + way * here);
+            mean += (here - share) * self.transfer.mean_opacity([before, value]);
+            (before, share) = (value, here);
+        }
+        mean
     }
 }

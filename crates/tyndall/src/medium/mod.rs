@@ -9,18 +9,23 @@ mod majorants;
 mod march;
 mod march_notes;
 mod marched_flight;
+mod packet_sample;
+mod site;
 mod skip;
 mod spread;
 mod step_ends;
+mod thickness;
 
 pub(crate) use clip::HalfSpace;
 pub use clip::{Clip, ClipShape};
 pub use free_flight::Collision;
 pub(crate) use free_flight::FlightNotes;
 pub use majorants::{CellStretch, CellWalk, MajorantGrid};
-pub(crate) use march::{PacketMarch, PacketSample, SeenLanes, TrackStart};
+pub(crate) use march::PacketMarch;
 pub(crate) use march_notes::MarchNotes;
 pub use marched_flight::MarchedCollision;
+pub(crate) use packet_sample::{PacketSample, SeenLanes};
+pub(crate) use thickness::TrackStart;
 
 use crate::math::{Binade, Interval, Ray, Vec3};
 use crate::scattering::{Brdf, Event, Phase, Surface, surface_share};
@@ -47,6 +52,22 @@ pub struct MediumSettings {
     pub clip: Vec<ClipShape>,
     /// Voxels along the edge of a majorant cell; 0 is one global majorant.
     pub majorant_cell: usize,
+}
+
+#[cfg(test)]
+impl MediumSettings {
+    /// Isotropic matter that reflects evenly, with nothing cut away.
+    pub(crate) fn plain(density: f32) -> Self {
+        Self {
+            density,
+            phase: Phase::Isotropic,
+            brdf: Brdf::Lambert,
+            gradient_factor: 3.0,
+            gradient_range: None,
+            clip: Vec::new(),
+            majorant_cell: 8,
+        }
+    }
 }
 
 /// A volume seen through a transfer function. Cheap to clone.
@@ -101,6 +122,14 @@ impl Track {
     #[must_use]
     pub fn at(&self, t: f32) -> Vec3 {
         self.ray.at(t)
+    }
+
+    /// Index-space positions at distances inside the medium.
+    #[inline(always)]
+    fn lanes<S: Lanes>(&self, simd: S, t: S::f32s) -> [S::f32s; 3] {
+        let (o, d) = (self.ray.origin.to_array(), self.ray.direction.to_array());
+        let splat = [S::f32s::splat(simd, o[0]), S::f32s::splat(simd, o[1]), S::f32s::splat(simd, o[2])];
+        [t.mul_add(d[0], splat[0]), t.mul_add(d[1], splat[1]), t.mul_add(d[2], splat[2])]
     }
 }
 
@@ -327,15 +356,7 @@ mod tests {
         let grid = Grid::centred([4, 3, 2], [1e-6; 3]).unwrap();
         let volume = Arc::new(Volume::new(grid, Voxels::U8((0..24).collect()), ValueMap::IDENTITY).unwrap());
         let transfer = TransferFunction::new(vec![Point { value: 0.0, optics: Optics::default() }]).unwrap();
-        let settings = MediumSettings {
-            density: 1.0,
-            phase: Phase::Isotropic,
-            brdf: Brdf::Lambert,
-            gradient_factor: 3.0,
-            gradient_range: None,
-            clip: Vec::new(),
-            majorant_cell: 8,
-        };
+        let settings = MediumSettings::plain(1.0);
         let medium = Medium::new(volume, Arc::new(transfer), &settings);
         for i in 0..1000_u16 {
             let aim = Vec3::new(f32::from(i % 10), f32::from(i / 10 % 10), f32::from(i / 100)) * 4e-7 - 2e-6;
@@ -352,15 +373,7 @@ mod tests {
         let volume = Arc::new(Volume::new(grid, voxels, ValueMap::IDENTITY).unwrap());
         let optics = Optics { surface: 0.7, ..Optics::default() };
         let transfer = Arc::new(TransferFunction::new(vec![Point { value: 0.0, optics }]).unwrap());
-        let settings = MediumSettings {
-            density: 1.0,
-            phase: Phase::Isotropic,
-            brdf: Brdf::Lambert,
-            gradient_factor: 3.0,
-            gradient_range: None,
-            clip: Vec::new(),
-            majorant_cell: 8,
-        };
+        let settings = MediumSettings::plain(1.0);
         let medium = Medium::new(volume, transfer, &settings);
         let here = Vec3::new(4.25, 0.5, 0.5);
         // A slope of 2 per world unit, a voxel of 1/2, values from 0 to 9.

@@ -4,7 +4,6 @@
 //! same variance. Their mean opacity then follows from the integrals of the opacity, however narrow its peaks are.
 
 use super::Medium;
-use crate::math::Vec3;
 use crate::simd::Lanes;
 use fearless_simd::prelude::*;
 
@@ -23,12 +22,7 @@ impl Medium {
 
     /// Half the width of the spread of values about an index-space position per lane, in a box with edges of so many voxels.
     #[inline(always)]
-    pub(crate) fn half_spread_lanes<S: Lanes>(
-        &self,
-        simd: S,
-        position: [S::f32s; 3],
-        edges: [f32; 3],
-    ) -> S::f32s {
+    pub(crate) fn half_spread<S: Lanes>(&self, simd: S, position: [S::f32s; 3], edges: [f32; 3]) -> S::f32s {
         let width = self.volume.robust_width().max(f32::MIN_POSITIVE);
         let mut sum = S::f32s::splat(simd, 0.0);
         for axis in 0..3 {
@@ -41,16 +35,5 @@ impl Medium {
         }
         // Each axis adds the twelfth of its squared change to the variance, an even spread the third of its squared half width.
         sum.sqrt() * (0.5 * width)
-    }
-
-    /// [`Self::half_spread_lanes`] about one position.
-    pub(crate) fn half_spread(&self, position: Vec3, edges: Vec3) -> f32 {
-        let width = self.volume.robust_width().max(f32::MIN_POSITIVE);
-        let change = |axis: Vec3| {
-            let half = axis * edges * 0.5;
-            let change = self.volume.value(position + half) - self.volume.value(position - half);
-            (change.abs() * (1.0 / width)).min(MOST_CHANGE)
-        };
-        Vec3::new(change(Vec3::X), change(Vec3::Y), change(Vec3::Z)).length() * (0.5 * width)
     }
 }

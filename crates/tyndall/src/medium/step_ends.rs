@@ -1,7 +1,7 @@
 //! The two ends of a step, and what lies between them.
 
 use super::Medium;
-use crate::math::Vec3;
+use super::site::{Piece, Site, between_values, share_of_line};
 use crate::simd::Lanes;
 use crate::transfer::OpacityLanes;
 use fearless_simd::prelude::*;
@@ -11,7 +11,7 @@ const HALVINGS: usize = 6;
 
 /// Values inside a step are read if the largest of three opacities, at its two ends and on average between them, is more than this many
 /// times the smallest. Where opacity changes less, it matters little how the values get from one end to the other.
-const STEADY: f32 = 2.0;
+pub(super) const STEADY: f32 = 2.0;
 
 /// A step holds a peak if its mean opacity is more than this many times that at both ends.
 const PEAK: f32 = 2.0;
@@ -249,86 +249,6 @@ impl<S: Lanes> StepEnds<S> {
     }
 }
 
-/// Where shares of the matter of steps have been met.
-#[derive(Clone, Copy)]
-pub(super) struct Site<S: Lanes> {
-    /// Share of the step.
-    pub share: S::f32s,
-    /// Data value there.
-    pub value: S::f32s,
-}
-
-impl<S: Lanes> Site<S> {
-    /// `self` in some lanes, `other` in the rest.
-    #[inline(always)]
-    fn or(self, lanes: S::mask32s, other: Self) -> Self {
-        Self { share: lanes.select(self.share, other.share), value: lanes.select(self.value, other.value) }
-    }
-}
-
-/// Pieces of steps along which values change linearly.
-struct Piece<S: Lanes> {
-    /// The shares of the step at its ends.
-    shares: [S::f32s; 2],
-    values: [S::f32s; 2],
-    opacities: [OpacityLanes<S>; 2],
-    /// The share of its matter that is met.
-    met: S::f32s,
-}
-
-impl<S: Lanes> Piece<S> {
-    /// Where that is: Newton's method, which knows the derivative, the opacity; halvings where it would leave the interval.
-    #[inline(always)]
-    fn search(&self, simd: S, medium: &Medium) -> Site<S> {
-        let [from, to] = self.opacities;
-        let [first, second] = self.values;
-        let zero = S::f32s::splat(simd, 0.0);
-        let total = from.area_to(to);
-        let bins = to.position - from.position;
-        let sure = self.met.min(-self.met + 1.0) * SURE;
-        let (mut lo, mut hi) = (zero, S::f32s::splat(simd, 1.0));
-        let mut at = share_of_line(simd, [from.opacity, to.opacity], self.met);
-        let mut open = !from.has_no_quotient(simd, to) & !total.simd_eq(zero);
-        for _ in 0..MOST_TRIES {
-            let here = medium.transfer.read_lanes(simd, between_values::<S>(first, second, at));
-            // Both areas are negative where values fall.
-            let missing = self.met - from.area_to(here) / total;
-            open &= missing.abs().simd_ge(sure);
-            if !open.any_true() {
-                break;
-            }
-            let above = missing.simd_gt(zero);
-            lo = (open & above).select(at, lo);
-            hi = (open & !above).select(at, hi);
-            let next = at + missing * total / (here.opacity * bins);
-            let next = (next.simd_gt(lo) & next.simd_lt(hi)).select(next, (lo + hi) * 0.5);
-            at = open.select(next, at);
-        }
-        let [start, end] = self.shares;
-        Site { share: (end - start).mul_add(at, start), value: between_values::<S>(first, second, at) }
-    }
-}
-
-/// Tries in the search, enough for halvings to find a site in single precision.
-const MOST_TRIES: usize = 24;
-/// The search ends when the share of matter that is met is wrong by less than this fraction of what is before the site, and of what is
-/// behind it.
-const SURE: f32 = 1e-2;
-
-/// The share of the way on which a share of the opacity is met, where opacity changes linearly: the root of a quadratic.
-#[inline(always)]
-fn share_of_line<S: Lanes>(simd: S, [a, b]: [S::f32s; 2], share: S::f32s) -> S::f32s {
-    let root = (share * (b * b - a * a) + a * a).max(0.0).sqrt();
-    let sum = a + root;
-    sum.simd_gt(S::f32s::splat(simd, 0.0)).select((share * (a + b) / sum).min(1.0), share)
-}
-
-/// Without a difference that might overflow.
-#[inline(always)]
-fn between_values<S: Lanes>(from: S::f32s, to: S::f32s, share: S::f32s) -> S::f32s {
-    to.mul_add(share, from * (-share + 1.0))
-}
-
 /// The share of the way along an axis at which the first plane through voxel centres is crossed; 1 if there is none.
 #[inline(always)]
 fn crossing<S: Lanes>(simd: S, from: S::f32s, to: S::f32s) -> S::f32s {
@@ -346,43 +266,11 @@ fn between<S: Lanes>(from: [S::f32s; 3], to: [S::f32s; 3], share: S::f32s) -> [S
     [(u - x).mul_add(share, x), (v - y).mul_add(share, y), (w - z).mul_add(share, z)]
 }
 
-impl Medium {
-    /// Mean opacity between two positions in index space, by the rule of [`StepEnds`]; the plain mean of the two where voxels
-    /// are not interpolated.
-    pub(super) fn mean_opacity(&self, [from, to]: [Vec3; 2]) -> f32 {
-        let values = [from, to].map(|p| self.volume.value(p));
-        let opacities = values.map(|value| self.transfer.opacity(value));
-        if !self.interpolates {
-            return 0.5 * (opacities[0] + opacities[1]);
-        }
-        let mean = self.transfer.mean_opacity(values);
-        let most = mean.max(opacities[0]).max(opacities[1]);
-        let least = mean.min(opacities[0]).min(opacities[1]);
-        if most <= least * STEADY || self.transfer.is_edge(values) {
-            return mean;
-        }
-        let way = to - from;
-        let border = |x: f32, way: f32| if way >= 0.0 { x.floor() + 1.0 } else { x.ceil() - 1.0 };
-        let crossing =
-            |x: f32, way: f32| Some((border(x, way) - x) / way).filter(|&s| s < 1.0).unwrap_or(1.0);
-        let mut shares = [crossing(from.x, way.x), crossing(from.y, way.y), crossing(from.z, way.z)];
-        shares.sort_by(f32::total_cmp);
-        let (mut before, mut share, mut mean) = (values[0], 0.0, 0.0);
-        for here in shares.into_iter().chain([1.0]) {
-            let value = self.volume.value(from + way * here);
-            mean += (here - share) * self.transfer.mean_opacity([before, value]);
-            (before, share) = (value, here);
-        }
-        mean
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::cast;
+    use crate::math::{Vec3, cast};
     use crate::medium::MediumSettings;
-    use crate::scattering::{Brdf, Phase};
     use crate::simd::{Kernel, Level};
     use crate::transfer::{Optics, Point, TransferFunction};
     use crate::volume::{Grid, Interpolation, ValueMap, Volume, Voxels};
@@ -407,26 +295,18 @@ mod tests {
             point(200.0, 1.0),
         ];
         let transfer = TransferFunction::for_volume(&volume, points).unwrap();
-        let settings = MediumSettings {
-            density: 1.0,
-            phase: Phase::Isotropic,
-            brdf: Brdf::Lambert,
-            gradient_factor: 3.0,
-            gradient_range: None,
-            clip: Vec::new(),
-            majorant_cell: 8,
-        };
+        let settings = MediumSettings::plain(1.0);
         Medium::new(Arc::new(volume), Arc::new(transfer), &settings)
     }
 
-    /// Mean opacity, share and value of steps given by their ends.
+    /// Mean opacity, share and value of steps given by their ends, and the range of values in them.
     struct Found<'a>(&'a Medium, &'a [[Vec3; 2]], f32);
 
     impl Kernel for Found<'_> {
-        type Output = Vec<[f32; 3]>;
+        type Output = Vec<[f32; 5]>;
 
         #[inline(always)]
-        fn run<S: Lanes>(self, simd: S) -> Vec<[f32; 3]> {
+        fn run<S: Lanes>(self, simd: S) -> Vec<[f32; 5]> {
             let Self(medium, steps, share) = self;
             let mut found = Vec::new();
             for steps in steps.chunks_exact(S::WIDTH) {
@@ -440,7 +320,9 @@ mod tests {
                 ends.refine(simd, medium, positions, lanes);
                 let met = ends.site(simd, medium, S::f32s::splat(simd, share), all);
                 for lane in 0..S::WIDTH {
-                    found.push([&ends.mean, &met.share, &met.value].map(|lanes| lanes.as_slice()[lane]));
+                    let [least, most] = ends.range();
+                    let lanes = [&ends.mean, &met.share, &met.value, &least, &most];
+                    found.push(lanes.map(|lanes| lanes.as_slice()[lane]));
                 }
             }
             found
@@ -470,12 +352,17 @@ mod tests {
                 for level in Level::available() {
                     let found = level.run(Found(&medium, &steps, share));
                     assert_eq!(found.len(), steps.len());
-                    for (&[from, to], [mean, met, value]) in steps.iter().zip(found) {
+                    for (&[from, to], [mean, met, value, least, most]) in steps.iter().zip(found) {
                         let at = |i: f32| medium.volume.value(from + (to - from) * (i / f32::from(PARTS)));
                         let opacities: Vec<f64> = (0..PARTS)
                             .map(|i| f64::from(medium.transfer.opacity(at(f32::from(i) + 0.5))))
                             .collect();
                         let expected = opacities.iter().sum::<f64>() / f64::from(PARTS);
+                        let is_noted = |value: f32| least - 0.01 <= value && value <= most + 0.01;
+                        assert!(
+                            (0..PARTS).all(|i| is_noted(at(f32::from(i)))),
+                            "{least} to {most}, {level:?}"
+                        );
                         let off = (f64::from(mean) - expected).abs();
                         // A border between voxels is found to a 128th of a step, on which opacity may rise to 1.
                         let near = if medium.interpolates { 0.002 } else { 0.008 };

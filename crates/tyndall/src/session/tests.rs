@@ -7,7 +7,6 @@ use crate::integrator::{DEFAULT_METHOD, METHODS, Resources, method_named, method
 use crate::light::{Directional, Light, LightSet};
 use crate::math::{Rgb, Vec3};
 use crate::medium::{Medium, MediumSettings};
-use crate::scattering::{Brdf, Phase};
 use crate::scene::{Background, MethodChoice, RenderSettings, Scene};
 use crate::simd::Level;
 use crate::transfer::{Optics, Point, TransferFunction};
@@ -29,15 +28,7 @@ fn scene(method: MethodChoice, density: f32) -> Scene {
     let point = |value, opacity| Point { value, optics: Optics { opacity, ..Optics::default() } };
     let points = vec![point(0.1, 0.0), point(0.9, 1.0)];
     let transfer = Arc::new(TransferFunction::over(volume.value_bins(), points).expect("a function"));
-    let settings = MediumSettings {
-        density,
-        phase: Phase::Isotropic,
-        brdf: Brdf::Lambert,
-        gradient_factor: 3.0,
-        gradient_range: None,
-        clip: Vec::new(),
-        majorant_cell: 8,
-    };
+    let settings = MediumSettings::plain(density);
     let lens = FitLens::Perspective { fov: 35.0, aperture: 0.0, focus: None };
     let size = [18, 17];
     let camera = fit(volume.grid(), AutoView::default_for(volume.grid().space()), None, lens, size);

@@ -16,6 +16,7 @@ pub use difference::{BinSet, TransferDifference};
 pub use historygram::{Grouping, HistoryGroups, Historygram};
 pub use optics::Optics;
 pub(crate) use pre_integrated::OpacityLanes;
+use pre_integrated::narrowest_peak;
 pub use presets::{PRESETS, Preset, PresetError};
 
 use crate::math::{Rgb, cast};
@@ -58,23 +59,6 @@ pub struct TransferFunction {
     narrowest_peak: f32,
     /// `None` where nothing glows.
     glow: Option<GlowTable>,
-}
-
-/// See [`TransferFunction::narrowest_peak`].
-fn narrowest_peak(points: &[Point]) -> f32 {
-    let mut narrowest = f32::INFINITY;
-    let mut last_rise = None;
-    for pair in points.windows(2) {
-        let (from, to) = (pair[0].optics.opacity, pair[1].optics.opacity);
-        if to > from {
-            last_rise = Some(pair[0].value);
-        } else if to < from
-            && let Some(start) = last_rise.take()
-        {
-            narrowest = narrowest.min(pair[1].value - start);
-        }
-    }
-    narrowest
 }
 
 /// Bins of the segment index.
@@ -207,31 +191,6 @@ impl TransferFunction {
     #[inline(always)]
     pub(crate) fn opacity_lanes<S: Lanes>(&self, simd: S, values: S::f32s) -> S::f32s {
         self.opacities.opacities(simd, values, |value| self.exact_opacity(value))
-    }
-
-    /// Opacity and its integral at a value per lane.
-    #[inline(always)]
-    pub(crate) fn read_lanes<S: Lanes>(&self, simd: S, values: S::f32s) -> OpacityLanes<S> {
-        self.opacities.read_lanes(simd, values, |value| self.exact_opacity(value))
-    }
-
-    /// Mean opacity of all data values between two.
-    #[must_use]
-    pub fn mean_opacity(&self, values: [f32; 2]) -> f32 {
-        let [from, to] = values.map(|value| self.opacities.read(value, |value| self.exact_opacity(value)));
-        from.mean(to)
-    }
-
-    /// Whether two data values are so far apart that nothing lies between: an edge.
-    pub(crate) fn is_edge(&self, values: [f32; 2]) -> bool {
-        let [from, to] = values.map(|value| self.opacities.read(value, |value| self.exact_opacity(value)));
-        from.is_edge(to)
-    }
-
-    /// Width, in data values, of the narrowest stretch in which opacity rises and falls, from point to point; infinite if it does so
-    /// nowhere.
-    pub(crate) fn narrowest_peak(&self) -> f32 {
-        self.narrowest_peak
     }
 
     /// Smallest and largest opacity over data values `[lo, hi]`.

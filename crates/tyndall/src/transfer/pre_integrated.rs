@@ -3,6 +3,7 @@
 //! Where values change linearly from one sample to the next, the mean opacity between the two is the difference of the
 //! opacity's integrals over the difference of the values, however narrow the function's peaks are.
 
+use super::{Point, TransferFunction};
 use crate::simd::Lanes;
 use fearless_simd::prelude::*;
 
@@ -122,6 +123,54 @@ impl OpacityRead {
             return 0.5 * (self.opacity + to.opacity);
         }
         (self.area_to(to) / (to.position - self.position)).clamp(0.0, 1.0)
+    }
+}
+
+/// See [`TransferFunction::narrowest_peak`].
+pub(super) fn narrowest_peak(points: &[Point]) -> f32 {
+    let mut narrowest = f32::INFINITY;
+    let mut last_rise = None;
+    for pair in points.windows(2) {
+        let (from, to) = (pair[0].optics.opacity, pair[1].optics.opacity);
+        if to > from {
+            last_rise = Some(pair[0].value);
+        } else if to < from
+            && let Some(start) = last_rise.take()
+        {
+            narrowest = narrowest.min(pair[1].value - start);
+        }
+    }
+    narrowest
+}
+
+impl TransferFunction {
+    /// Opacity and its integral at a value per lane.
+    #[inline(always)]
+    pub(crate) fn read_lanes<S: Lanes>(&self, simd: S, values: S::f32s) -> OpacityLanes<S> {
+        self.opacities.read_lanes(simd, values, |value| self.exact_opacity(value))
+    }
+
+    /// Mean opacity of all data values between two.
+    #[must_use]
+    pub fn mean_opacity(&self, values: [f32; 2]) -> f32 {
+        let [from, to] = values.map(|value| self.read(value));
+        from.mean(to)
+    }
+
+    /// Whether two data values are so far apart that nothing lies between: an edge.
+    pub(crate) fn is_edge(&self, values: [f32; 2]) -> bool {
+        let [from, to] = values.map(|value| self.read(value));
+        from.is_edge(to)
+    }
+
+    fn read(&self, value: f32) -> OpacityRead {
+        self.opacities.read(value, |value| self.exact_opacity(value))
+    }
+
+    /// Width, in data values, of the narrowest stretch in which opacity rises and falls, from point to point; infinite if it does so
+    /// nowhere.
+    pub(crate) fn narrowest_peak(&self) -> f32 {
+        self.narrowest_peak
     }
 }
 

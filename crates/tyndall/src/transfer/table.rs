@@ -107,20 +107,14 @@ impl OpacityTable {
     }
 
     /// Whether look-ups in a bin differ in any bit from those of another table over the same bins, or only one of the
-    /// two evaluates the function there, or the area of the bin differs.
+    /// two evaluates the function there.
     pub(super) fn differs(&self, other: &Self, bin: usize) -> bool {
         let row = |table: &Self| {
             let split = table.splits[bin];
             let lines = [0, 1, 2, 3].map(|i| table.lines[4 * bin + i].to_bits());
             (!split.is_nan()).then_some((split.to_bits(), lines))
         };
-        row(self) != row(other) || self.area(bin) != other.area(bin)
-    }
-
-    /// The area of a bin, up to where its second line begins and in all.
-    fn area(&self, bin: usize) -> [Option<i32>; 2] {
-        let up_to = |line: usize| self.areas.get(line).map(|area| area >> 1);
-        [1, 2].map(|after| Some(up_to(2 * bin + after)? - self.areas[2 * bin] / 2))
+        row(self) != row(other)
     }
 
     /// Whether two values, and all values between them, have the same position in the table.

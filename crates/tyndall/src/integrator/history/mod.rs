@@ -149,7 +149,6 @@ impl FlightNotes for Writer<'_> {
 mod tests {
     use super::*;
     use crate::medium::MediumSettings;
-    use crate::scattering::{Brdf, Phase};
     use crate::transfer::{Optics, Point, TransferDifference, TransferFunction};
     use crate::volume::procedural::{Field, Kind};
     use std::sync::Arc;
@@ -166,15 +165,7 @@ mod tests {
             let points = [(0.1, 0.0), (0.3, low), (0.35, low), (0.45, 0.2), (0.6, high), (0.7, 0.1)];
             let points = points.map(|(value, opacity)| point(value, opacity)).to_vec();
             let transfer = TransferFunction::over(volume.value_bins(), points).expect("a function");
-            let settings = MediumSettings {
-                density: 1.0,
-                phase: Phase::Isotropic,
-                brdf: Brdf::Lambert,
-                gradient_factor: 3.0,
-                gradient_range: None,
-                clip: Vec::new(),
-                majorant_cell: 1,
-            };
+            let settings = MediumSettings { majorant_cell: 1, ..MediumSettings::plain(1.0) };
             Medium::new(volume.clone(), Arc::new(transfer), &settings)
         };
         // Where both groups occur, the first attains the majorant before, and does again at the end, below the second.

@@ -84,13 +84,15 @@ impl PhotonMap {
 
     /// Half of the width over which values spread between the points that look for matter around a position, or 0 where opacity changes
     /// so slowly with the value that points stand for what is between them.
-    pub fn half_spread(&self, medium: &Medium, position: Vec3) -> f32 {
+    #[inline(always)]
+    pub fn half_spread<S: Lanes>(&self, simd: S, medium: &Medium, position: Vec3) -> f32 {
         let edges = between_points(&self.grid);
-        if medium.may_peak_within(NARROW * edges.max_element()) {
-            medium.half_spread(position, edges)
-        } else {
-            0.0
+        if !medium.may_peak_within(NARROW * edges.max_element()) {
+            return 0.0;
         }
+        let Vec3 { x, y, z } = position;
+        let position = [S::f32s::splat(simd, x), S::f32s::splat(simd, y), S::f32s::splat(simd, z)];
+        medium.half_spread(simd, position, edges.to_array()).as_slice()[0]
     }
 
     /// The light at a site with this data value, still to be multiplied by the albedo: equal to the last bit to that of

@@ -214,6 +214,43 @@ impl<T: Copy> SegmentLists<T> {
     }
 }
 
+/// What is kept of the gathers of a tile's segments.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct SegmentGathers {
+    pub parts: SegmentLists<Gathered>,
+    pub sites: SegmentLists<GatherSite>,
+    /// Segments whose light must be gathered again before they are seen.
+    pub outdated: Vec<bool>,
+}
+
+impl SegmentGathers {
+    /// Forgets all, of this many segments.
+    pub fn reset(&mut self, segments: usize) {
+        self.parts.reset(segments);
+        self.sites.reset(segments);
+        self.outdated.clear();
+        self.outdated.resize(segments, false);
+    }
+
+    /// Forgets what a segment gathered.
+    pub fn forget(&mut self, segment: usize) {
+        self.parts.forget(segment);
+        self.sites.forget(segment);
+        self.outdated[segment] = false;
+    }
+
+    /// Keeps what a lane gathered along a segment, as far as there is memory.
+    pub fn keep(&mut self, segment: usize, gathers: &LaneGathers, lane: usize, memory: &GatherMemory) {
+        self.parts.set(segment, gathers.parts(lane), &memory.parts);
+        self.sites.set(segment, gathers.sites(lane), &memory.sites);
+    }
+
+    /// Size in bytes.
+    pub fn bytes(&self) -> usize {
+        self.parts.bytes() + self.sites.bytes() + size_of_val(&self.outdated[..])
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,10 +9,12 @@
 //! equals that of a new session, bit for bit. The first sample of every pixel uses this *base map*; later ones are
 //! refinement passes with their own photons and a shrinking radius \[Knaus11\], which restart after an edit.
 
+mod division;
 mod edit;
 mod gather;
 mod gathering;
 mod gathers;
+mod kept;
 mod kernel;
 mod map;
 mod matter;
@@ -31,20 +33,20 @@ use super::light_paths::{
     Chunk, ChunkBytes, Ground, HistoryDetail, LightPaths, Plan, Tracing, most_kept, sources,
 };
 use super::{
-    Edited, ItemChanges, KeptCount, KeptItems, Limits, MemoryNeed, Method, MethodReport, NamedCount,
-    PixelCounts, Resources, SettingProblem, StageNames, Stop, Updated, WorkShare, drop_elsewhere,
+    Edited, KeptCount, KeptItems, Limits, MemoryNeed, Method, MethodReport, NamedCount, PixelCounts,
+    Resources, SettingProblem, StageNames, Stop, Updated, WorkShare, drop_elsewhere,
 };
 use crate::film::{Goal, Tile};
 use crate::light::Enclosure;
 use crate::math::DVec3;
 use crate::scene::{Difference, Scene};
 use gathers::GatherMemory;
+use kept::KeptLight;
 use kernel::Slice;
 use map::{Lit, MapSettings, MapState, PhotonMap};
 use pass::Pass;
 use segments::{GatherSegments, SegmentCounts, SegmentTile};
 use settings::Estimator;
-use std::any::Any;
 use stored::Photon;
 use view::View;
 
@@ -350,44 +352,6 @@ fn marks_for(scene: &Scene, settings: &Settings) -> ChangeMarks {
 /// Memory for what is kept of gathers, out of so many bytes; `None` if there is none.
 fn gather_memory(scene: &Scene, bytes: usize) -> Option<GatherMemory> {
     (bytes > 0).then(|| GatherMemory::new(scene.size, bytes))
-}
-
-/// Light paths and view-ray segments at one point in time.
-struct KeptLight {
-    lights: Vec<LightPaths<Photon>>,
-    tiles: Vec<Option<SegmentTile>>,
-}
-
-impl KeptLight {
-    /// Number of paths that differ in `lights`, or do not exist there.
-    fn paths_differing(&self, lights: &[LightPaths<Photon>]) -> usize {
-        let of_light = |light: &LightPaths<Photon>| {
-            let same = lights.iter().find(|other| other.stream == light.stream);
-            let chunks = light.chunks.iter().enumerate();
-            let differing = chunks.map(|(i, chunk)| {
-                same.and_then(|same| same.chunks.get(i)).map_or(chunk.len(), |other| chunk.differing(other))
-            });
-            differing.sum::<usize>()
-        };
-        self.lights.iter().map(of_light).sum()
-    }
-}
-
-impl KeptItems for KeptLight {
-    fn compare(&self, other: &dyn KeptItems) -> ItemChanges {
-        let other: &dyn Any = other;
-        let (lights, tiles) =
-            other.downcast_ref::<Self>().map_or((&[][..], &[][..]), |other| (&other.lights, &other.tiles));
-        let mut changes = ItemChanges { differing: self.paths_differing(lights), new: 0 };
-        for (i, segments) in self.tiles.iter().enumerate() {
-            let Some(segments) = segments else { continue };
-            changes += match tiles.get(i) {
-                Some(Some(other)) => segments.compare(other),
-                _ => ItemChanges { differing: 0, new: segments.len() },
-            };
-        }
-        changes
-    }
 }
 
 /// Sorts the photons of all lights into a map, unless it is ready; `radius` in voxels. False if stopped first.

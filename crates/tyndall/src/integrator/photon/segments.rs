@@ -1,7 +1,7 @@
 //! View rays divided into segments, each computed, kept and invalidated independently \[Jonsson12, sec. 4.3.2\].
 
-use super::gather::GatherSite;
-use super::gathers::{GatherMemory, Gathered, LaneGathers, SegmentLists, radiance};
+use super::division::{due_in, ends, segment_of, steps_of};
+use super::gathers::{GatherMemory, LaneGathers, SegmentGathers, radiance};
 use super::segment::Segment;
 use super::view::{Notes, Stretches, View};
 use crate::film::{Goal, PixelSample, Tile};
@@ -32,15 +32,6 @@ pub struct SegmentTile {
     /// Number of pixels whose segments have been asked, if a stop interrupted that.
     asked: usize,
     pub(super) computed: SegmentCounts,
-}
-
-/// What is kept of the gathers of a tile's segments.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct SegmentGathers {
-    parts: SegmentLists<Gathered>,
-    sites: SegmentLists<GatherSite>,
-    /// Segments whose light must be gathered again before they are seen.
-    outdated: Vec<bool>,
 }
 
 /// Values whose change is visible along a view ray.
@@ -119,9 +110,7 @@ impl SegmentTile {
 
     /// Size of these in bytes.
     pub fn bytes_of_gathers(&self) -> usize {
-        self.gathers
-            .as_ref()
-            .map_or(0, |kept| kept.parts.bytes() + kept.sites.bytes() + size_of_val(&kept.outdated[..]))
+        self.gathers.as_ref().map_or(0, SegmentGathers::bytes)
     }
 
     /// Differences between its known segments and those known at another time; all are new if the number of segments
@@ -273,55 +262,6 @@ impl SegmentTile {
     }
 }
 
-impl SegmentGathers {
-    fn reset(&mut self, segments: usize) {
-        self.parts.reset(segments);
-        self.sites.reset(segments);
-        self.outdated.clear();
-        self.outdated.resize(segments, false);
-    }
-
-    fn forget(&mut self, segment: usize) {
-        self.parts.forget(segment);
-        self.sites.forget(segment);
-        self.outdated[segment] = false;
-    }
-
-    /// Keeps what a lane gathered along a segment, as far as there is memory.
-    fn keep(&mut self, segment: usize, gathers: &LaneGathers, lane: usize, memory: &GatherMemory) {
-        self.parts.set(segment, gathers.parts(lane), &memory.parts);
-        self.sites.set(segment, gathers.sites(lane), &memory.sites);
-    }
-}
-
-/// The range of a segment's steps: a ray's steps are divided evenly among its segments.
-fn steps_of(segment: usize, per_ray: usize, count: i32) -> [i32; 2] {
-    let border = |segment: usize| {
-        let steps = i64::from(count) * segment as i64 / per_ray as i64;
-        i32::try_from(steps).unwrap_or(i32::MAX)
-    };
-    [border(segment), border(segment + 1)]
-}
-
-/// The distances along the track at which a range of steps begins and ends.
-fn ends(steps: [i32; 2], step: f32) -> [f32; 2] {
-    steps.map(|k| k as f32 * step)
-}
-
-/// The segment that a step is in.
-fn segment_of(step: i32, per_ray: usize, count: i32) -> usize {
-    let number = ((i64::from(step) + 1) * per_ray as i64 - 1) / i64::from(count.max(1));
-    usize::try_from(number).unwrap_or(0).min(per_ray - 1)
-}
-
-/// Fraction of a gather due at the beginning of a segment: evenly distributed over neighbouring pixels and segments, by
-/// a lattice of irrational steps.
-fn due_in([x, y]: [u32; 2], segment: usize) -> f32 {
-    let along = cast::fit_u32(segment).wrapping_mul(0x9e37_79b9);
-    let turn = x.wrapping_mul(0xc13f_a9a9).wrapping_add(y.wrapping_mul(0x91e1_0da5)).wrapping_add(along);
-    (turn >> 8) as f32 / (1 << 24) as f32
-}
-
 /// The ray of a pixel's segments, through the middle of the pixel and of the lens.
 fn ray_of(scene: &Scene, [x, y]: [u32; 2]) -> (Ray, Track) {
     let ray = scene.camera.ray(scene.size, [x as f32 + 0.5, y as f32 + 0.5], [0.5; 2]);
@@ -431,39 +371,6 @@ impl Kernel for GatherSegments<'_> {
         }
         for (ray, of_ray) in turn.zip(&rays) {
             tile.add(&segments.composite(&view, ray, of_ray));
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn gathers_are_due_evenly_over_neighbouring_pixels() {
-        for (x, y, segment) in [(0, 0, 0), (0, 0, 1), (500, 301, 6), (4000, 3, 19)] {
-            let pixels = (0..64).map(|i| [x + i % 8, y + i / 8]);
-            let mut due: Vec<f32> = pixels.map(|pixel| due_in(pixel, segment)).collect();
-            due.sort_by(f32::total_cmp);
-            for (i, due) in due.iter().enumerate() {
-                assert!((due - (i as f32 + 0.5) / 64.0).abs() < 0.06, "{i}: {due}");
-            }
-        }
-    }
-
-    #[test]
-    fn every_step_is_in_the_segment_that_has_it() {
-        for (per_ray, count) in [(1, 7), (7, 3), (7, 700), (20, 333), (5, 0)] {
-            let mut next = 0;
-            for segment in 0..per_ray {
-                let [from, to] = steps_of(segment, per_ray, count);
-                assert_eq!(from, next);
-                for step in from..to {
-                    assert_eq!(segment_of(step, per_ray, count), segment, "{step} of {count}");
-                }
-                next = to;
-            }
-            assert_eq!(next, count);
         }
     }
 }

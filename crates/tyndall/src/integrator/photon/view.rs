@@ -141,7 +141,7 @@ impl View<'_> {
         let medium = &*self.scene.medium;
         let optics = medium.transfer().optics(value);
         let event = medium.event(position, &optics);
-        let half_spread = map.half_spread(medium, position);
+        let half_spread = map.half_spread(simd, medium, position);
         let (mut opacity, mut mean) = (optics.opacity, optics.opacity);
         if half_spread > 0.0 {
             let ends = [value - half_spread, value + half_spread];

@@ -6,6 +6,7 @@
 
 use super::bricks::EDGE;
 use super::course::{Axes, Course};
+use super::rows::{RowExtinction, between, load, mix_rows};
 use super::slab::{Slab, union};
 use super::step::{Crossings, RowWay, Step};
 use super::texels::{PassedRays, PlaneOfBrick, RayGrid};
@@ -235,30 +236,14 @@ struct PassRow<'a> {
 struct Space {
     /// Extinction at the texels of a row.
     row: Vec<f32>,
-    before: Met,
-    here: Met,
+    before: RowExtinction,
+    here: RowExtinction,
 }
 
 impl Space {
     fn new(texels: usize, rays: usize) -> Self {
-        let met = || Met { rays: 0..0, extinction: vec![0.0; rays] };
+        let met = || RowExtinction::new(rays);
         Self { row: vec![0.0; texels + 2 * ROW_PAD], before: met(), here: met() }
-    }
-}
-
-/// What a row of rays meets at a plane.
-#[derive(Clone, Debug, Default)]
-struct Met {
-    /// Rays that may meet matter.
-    rays: Range<usize>,
-    /// Extinction at each ray's crossing; 0 for other rays.
-    extinction: Vec<f32>,
-}
-
-impl Met {
-    fn clear(&mut self) {
-        self.extinction[self.rays.clone()].fill(0.0);
-        self.rays = 0..0;
     }
 }
 
@@ -319,7 +304,15 @@ impl Kernel for PassRow<'_> {
 impl Fan {
     /// The extinction where a row of rays crosses the `m`-th plane of a slab, of which the first is the one before. `row` is space.
     #[inline(always)]
-    fn meet<S: Lanes>(&self, simd: S, slab: &Slab, m: usize, j: usize, row: &mut [f32], met: &mut Met) {
+    fn meet<S: Lanes>(
+        &self,
+        simd: S,
+        slab: &Slab,
+        m: usize,
+        j: usize,
+        row: &mut [f32],
+        met: &mut RowExtinction,
+    ) {
         met.clear();
         let [nu, nv, _] = self.course.texels;
         let [rays, _] = self.rays;
@@ -366,38 +359,6 @@ impl Fan {
         let aligned = met.rays.start / S::WIDTH * S::WIDTH..met.rays.end.next_multiple_of(S::WIDTH);
         met.extinction[aligned.start..met.rays.start].fill(0.0);
         met.extinction[met.rays.end..aligned.end].fill(0.0);
-    }
-}
-
-/// Numbers of a row from a place on; 0 past its end.
-#[inline(always)]
-fn load<S: Lanes>(simd: S, row: &[f32], first: usize) -> S::f32s {
-    match row.get(first..first + S::WIDTH) {
-        Some(numbers) => S::f32s::from_slice(simd, numbers),
-        None => S::f32s::from_fn(simd, |lane| row.get(first + lane).copied().unwrap_or(0.0)),
-    }
-}
-
-/// Between an entry of a table and the next.
-#[inline(always)]
-fn between<S: Lanes>(simd: S, table: &[f32], entry: S::u32s, share: S::f32s) -> S::f32s {
-    let (a, b) = (simd.numbers(table, entry), simd.numbers(table, entry + 1));
-    (b - a).mul_add(share, a)
-}
-
-/// Between two rows.
-#[inline(always)]
-fn mix_rows<S: Lanes>(simd: S, [a, b]: [&[f32]; 2], share: f32, out: &mut [f32]) {
-    let width = S::WIDTH;
-    let whole = out.len() / width * width;
-    for i in (0..whole).step_by(width) {
-        let from = S::f32s::from_slice(simd, &a[i..i + width]);
-        let to = S::f32s::from_slice(simd, &b[i..i + width]);
-        let mixed = (to - from).mul_add(S::f32s::splat(simd, share), from);
-        mixed.store_slice(&mut out[i..i + width]);
-    }
-    for i in whole..out.len() {
-        out[i] = (b[i] - a[i]).mul_add(share, a[i]);
     }
 }
 

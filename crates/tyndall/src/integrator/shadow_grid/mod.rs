@@ -11,6 +11,7 @@ mod bricks;
 mod course;
 mod fan;
 mod lattice;
+mod rows;
 mod slab;
 mod step;
 mod sweeps;

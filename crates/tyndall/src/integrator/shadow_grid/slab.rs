@@ -199,7 +199,7 @@ impl Parts {
         if !self.may_hold_peaks {
             return transfer.opacity_lanes(simd, value);
         }
-        let half = medium.half_spread_lanes(simd, position, self.edges);
+        let half = medium.half_spread(simd, position, self.edges);
         transfer.read_lanes(simd, value - half).mean(simd, transfer.read_lanes(simd, value + half))
     }
 }

@@ -1,7 +1,6 @@
 use super::*;
 use crate::math::Ray;
 use crate::medium::MediumSettings;
-use crate::scattering::{Brdf, Phase};
 use crate::transfer::{Optics, Point, TransferFunction};
 use crate::volume::{ValueMap, Volume, Voxels};
 use std::sync::Arc;
@@ -16,15 +15,7 @@ fn block(dims: [usize; 3]) -> Medium {
         value: 0.0,
         optics: Optics { opacity: 1.0, ..Optics::default() },
     }]);
-    let settings = MediumSettings {
-        density: 0.05,
-        phase: Phase::Isotropic,
-        brdf: Brdf::Lambert,
-        gradient_factor: 3.0,
-        gradient_range: None,
-        clip: Vec::new(),
-        majorant_cell: 8,
-    };
+    let settings = MediumSettings::plain(0.05);
     Medium::new(volume, Arc::new(transfer.unwrap()), &settings)
 }
 
