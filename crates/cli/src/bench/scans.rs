@@ -217,8 +217,7 @@ pub fn first_pictures(effort: &Effort, level: Level, scans: &[Scan]) -> Result<V
     let side = effort.pick(512, 64);
     for Scan { kind, file } in scans {
         effort.show(&format!("{}, loading", kind.name));
-        let value = json!({ "version": 1, "volume": { "path": file }, "film": { "size": [side, side] } });
-        let bench = Bench::new(value, 2)?;
+        let bench = Bench::of_file(file, &json!({ "film": { "size": [side, side] } }), 2, level)?;
         for method in METHODS {
             let case = format!("{}, {}", kind.name, method.name);
             effort.show(&case);

@@ -9,7 +9,7 @@ use tyndall::scene::Scene;
 use tyndall::session::{Budget, Session};
 use tyndall::simd::Level;
 use tyndall_live::document::{self, Document};
-use tyndall_live::{Assets, Built, assets};
+use tyndall_live::{Assets, Built, Input, LoadedScene, Options, assets};
 
 /// A mostly empty volume with a thin dense shell, as CT is; 8-bit.
 pub fn ct(voxels: u32) -> Value {
@@ -48,12 +48,21 @@ pub struct Bench {
 impl Bench {
     /// Generates the volume.
     pub fn new(value: Value, threads: usize) -> Result<Self, Failure> {
-        let threads = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map(Arc::new);
-        let threads = threads.map_err(|e| Failure::input(format!("threads: {e}")))?;
+        let threads = pool(threads)?;
         let mut document = Document::from_value(value.clone()).map_err(Failure::input)?;
         let (assets, _) =
             threads.install(|| assets::load(&mut document, Path::new(""))).map_err(Failure::input)?;
         Ok(Self { value, assets, threads })
+    }
+
+    /// A bare file, with all that is then chosen for it, patched.
+    pub fn of_file(file: &Path, patch: &Value, threads: usize, level: Level) -> Result<Self, Failure> {
+        let threads = pool(threads)?;
+        let mut input = Input::open(file).map_err(Failure::input)?;
+        input.patch(patch).map_err(Failure::input)?;
+        let options = Options { threads: threads.clone(), level, edits: false };
+        let LoadedScene { document, assets, .. } = input.load(&options).map_err(Failure::input)?;
+        Ok(Self { value: document.to_value(), assets, threads })
     }
 
     /// The scene of the patched document.
@@ -80,4 +89,9 @@ impl Bench {
         session.refine(&Budget::samples(samples));
         session
     }
+}
+
+fn pool(threads: usize) -> Result<Arc<rayon::ThreadPool>, Failure> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map(Arc::new);
+    pool.map_err(|e| Failure::input(format!("threads: {e}")))
 }
