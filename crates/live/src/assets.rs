@@ -6,7 +6,7 @@ use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tyndall::light::{Map, MapError};
+use tyndall::light::{self, Map, MapError};
 use tyndall::message::path_name;
 use tyndall::volume::procedural::{Field, Kind};
 use tyndall::volume::{Bricks, GridError, Interpolation, Volume};
@@ -20,13 +20,30 @@ pub struct Assets {
     pub volume: Arc<Volume>,
     /// Environment maps, by path as given in the document.
     pub maps: BTreeMap<String, Arc<Map>>,
+    /// The maps of studios, one for each that differs from the others.
+    pub studios: Vec<StudioMap>,
+}
+
+/// A studio's map.
+#[derive(Clone, Debug)]
+pub struct StudioMap {
+    /// The studio, as in the document.
+    pub studio: document::Studio,
+    /// Its radiance.
+    pub map: Arc<Map>,
 }
 
 impl Assets {
-    /// Whether both share the same maps in memory.
+    /// Whether both share the same maps of files in memory.
     pub(crate) fn shares_maps(&self, other: &Self) -> bool {
         let same = |(path, map)| other.maps.get(path).is_some_and(|other| Arc::ptr_eq(map, other));
         self.maps.len() == other.maps.len() && self.maps.iter().all(same)
+    }
+
+    /// The map of a studio.
+    #[must_use]
+    pub fn studio(&self, studio: &document::Studio) -> Option<&Arc<Map>> {
+        self.studios.iter().find(|known| known.studio == *studio).map(|known| &known.map)
     }
 }
 
@@ -80,6 +97,14 @@ pub enum AssetError {
         /// Why.
         source: MapError,
     },
+    /// A studio's lamps are together too bright.
+    #[error("`lights.{light}.studio`: {source}")]
+    Studio {
+        /// Index of the light.
+        light: usize,
+        /// Why.
+        source: MapError,
+    },
 }
 
 /// Loads what a document refers to, in parallel on the current thread pool, and states in the document what it leaves open and the
@@ -92,7 +117,8 @@ pub fn load(document: &mut Document, folder: &Path) -> Result<(Assets, Source), 
     chosen::state(document, &volume);
     let volume = Arc::new(volume.with_interpolation(interpolation(document)));
     let maps = maps(document, folder, &BTreeMap::new())?;
-    Ok((Assets { volume, maps }, source))
+    let studios = studios(document, &[])?;
+    Ok((Assets { volume, maps, studios }, source))
 }
 
 /// As [`load`], for an edited document, in parallel on a thread pool: only what the document before the edit did not refer to is read;
@@ -131,7 +157,8 @@ pub fn reload(
     let maps = || maps(document, folder, &assets.maps);
     let all_known = document.lights.iter().flatten().all(known);
     // With nothing to read, handing over to other threads would take longer than the edit.
-    Ok(Assets { volume, maps: if all_known { maps() } else { threads.install(maps) }? })
+    let maps = if all_known { maps() } else { threads.install(maps) }?;
+    Ok(Assets { volume, maps, studios: studios(document, &assets.studios)? })
 }
 
 fn interpolation(document: &Document) -> Interpolation {
@@ -162,6 +189,38 @@ fn maps(
         }
     }
     Ok(maps)
+}
+
+/// The maps of a document's studios; those in `known` are not computed again.
+fn studios(document: &Document, known: &[StudioMap]) -> Result<Vec<StudioMap>, AssetError> {
+    let mut studios: Vec<StudioMap> = Vec::new();
+    for (light, l) in document.lights.iter().flatten().enumerate() {
+        let document::Light::Environment { studio: Some(studio), .. } = l else { continue };
+        if studios.iter().any(|other| other.studio == *studio) {
+            continue;
+        }
+        studios.push(match known.iter().find(|known| known.studio == *studio) {
+            Some(known) => known.clone(),
+            None => {
+                let map = studio_of(studio).map().map_err(|source| AssetError::Studio { light, source })?;
+                StudioMap { studio: studio.clone(), map: Arc::new(map) }
+            }
+        });
+    }
+    Ok(studios)
+}
+
+fn studio_of(studio: &document::Studio) -> light::Studio {
+    let softbox = |lamp: &document::Softbox| {
+        let document::Softbox { azimuth, elevation, size, softness, radiance } = *lamp;
+        light::Softbox { azimuth, elevation, size, softness, radiance: radiance.into() }
+    };
+    light::Studio {
+        zenith: studio.zenith.into(),
+        horizon: studio.horizon.into(),
+        ground: studio.ground.into(),
+        softboxes: studio.softboxes.iter().map(softbox).collect(),
+    }
 }
 
 fn volume(described: &document::Volume, folder: &Path) -> Result<(Volume, Source), AssetError> {

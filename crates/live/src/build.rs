@@ -2,31 +2,20 @@
 
 use crate::assets::Assets;
 use crate::document::{self, Document};
+use crate::lights::{default_lights, follow_camera, lights_of};
+use crate::scene_error::{SceneError, fault};
 use rayon::ThreadPool;
-use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 use tyndall::camera::{AutoFront, AutoView, Camera, FitLens, Lens, fit};
-use tyndall::light::{
-    Directional, Disk, Emission, Environment, Light, LightSet, PointLight, Rect, SphereLight,
-};
-use tyndall::math::{Bounds, DVec3, Frame, Rgb, Vec3, cast};
+use tyndall::light::{Emission, LightSet};
+use tyndall::math::{Bounds, DVec3, Frame, Vec3, cast};
 use tyndall::medium::{ClipShape, Medium, MediumSettings};
 use tyndall::message::excerpt;
 use tyndall::scattering::{Abc, Brdf, HenyeyGreenstein, Phase, Schlick};
 use tyndall::scene::{Background, RenderSettings, Scene};
 use tyndall::transfer::{Optics, PRESETS, Point, Preset, TransferFunction};
 use tyndall::volume::{Grid, Volume};
-
-/// Why no scene can be built from a document and its assets.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("`{path}`: {problem}")]
-pub struct SceneError {
-    /// Where in the document.
-    pub path: String,
-    /// What was found, what was expected, and how to fix it.
-    pub problem: String,
-}
 
 /// Optical thickness of a voxel beyond which single precision can no longer distinguish the positions of collisions.
 const DENSEST: f32 = 1000.0;
@@ -36,10 +25,6 @@ const FARTHEST: f32 = 1e18;
 
 /// Distances of a camera from its target whose squares single precision holds.
 const DISTANCES: RangeInclusive<f64> = 1e-15..=1e15;
-
-fn fault(path: impl Into<String>, problem: impl Display) -> SceneError {
-    SceneError { path: path.into(), problem: problem.to_string() }
-}
 
 /// A scene with what it was built from. An edited scene shares everything that the edit did not change.
 #[derive(Clone, Debug)]
@@ -88,11 +73,12 @@ fn build(
     let volume = &assets.volume;
     let same_volume = before.filter(|before| Arc::ptr_eq(&before.assets.volume, volume));
     let medium = medium(document, volume, same_volume, threads)?;
+    let camera = camera(document, volume)?;
     Ok(Scene {
         light_names: light_names(document, volume),
-        lights: lights(document, assets, &medium, same_volume, threads)?,
+        lights: lights(document, assets, &medium, &camera, same_volume, threads)?,
         medium,
-        camera: camera(document, volume)?,
+        camera,
         size: document.film.size,
         background: background(document),
         render: RenderSettings {
@@ -144,10 +130,14 @@ fn lights(
     document: &Document,
     assets: &Assets,
     medium: &Medium,
+    camera: &Camera,
     before: Option<&Built>,
     threads: &ThreadPool,
 ) -> Result<Arc<LightSet>, SceneError> {
-    let same_lights = before.filter(|b| b.document.lights == document.lights && b.assets.shares_maps(assets));
+    let same_lights = before.filter(|b| {
+        let same_axes = || b.scene.camera.frame() == camera.frame() || !follow_camera(&document.lights);
+        b.document.lights == document.lights && b.assets.shares_maps(assets) && same_axes()
+    });
     let same_matter = before.filter(|b| b.scene.medium.shares_matter(medium));
     if let (Some(before), Some(_)) = (same_lights, same_matter)
         && before.scene.medium.density().to_bits() == medium.density().to_bits()
@@ -157,11 +147,7 @@ fn lights(
     let lights = match (same_lights, &document.lights) {
         (Some(before), _) => before.scene.lights.lights().to_vec(),
         (None, None) => default_lights(medium.volume().grid()),
-        (None, Some(lights)) => {
-            let grid = medium.volume().grid();
-            let read = |(i, l)| light(l, grid, assets).map_err(|e| fault(format!("lights.{i}"), e));
-            lights.iter().enumerate().map(read).collect::<Result<_, _>>()?
-        }
+        (None, Some(lights)) => lights_of(lights, medium.volume().grid(), camera, assets)?,
     };
     let emission = || Emission::after(same_matter.and_then(|b| b.scene.lights.emission()), medium);
     let emission = if medium.transfer().emits() { threads.install(emission) } else { None };
@@ -264,57 +250,6 @@ fn medium_settings(document: &Document, grid: &Grid) -> Result<MediumSettings, S
         clip: clip.collect(),
         majorant_cell: document.medium.majorant_cell as usize,
     })
-}
-
-fn light(light: &document::Light, grid: &Grid, assets: &Assets) -> Result<Light, String> {
-    let (vector, world_up) = (Vec3::from_array, grid.space().up());
-    let at = |position: &[f64; 3]| grid.to_world(*position);
-    let between =
-        |from: &[f64; 3], to: &[f64; 3]| (DVec3::from_array(*to) - DVec3::from_array(*from)).as_vec3();
-    Ok(match light {
-        document::Light::Directional { direction, irradiance, angle, .. } => {
-            Light::Directional(Directional::new(vector(*direction), Rgb::from(*irradiance), *angle))
-        }
-        document::Light::Point { position, intensity, .. } => {
-            Light::Point(PointLight { position: at(position), intensity: Rgb::from(*intensity) })
-        }
-        document::Light::Rect { position, target, up, size, radiance, .. } => {
-            let facing = between(position, target);
-            let up = up.map_or(world_up, vector);
-            Light::Rect(Rect::new(at(position), facing, up, *size, Rgb::from(*radiance)))
-        }
-        document::Light::Disk { position, target, radius, radiance, .. } => {
-            let facing = between(position, target);
-            Light::Disk(Disk::new(at(position), facing, *radius, Rgb::from(*radiance)))
-        }
-        document::Light::Sphere { position, radius, radiance, .. } => Light::Sphere(SphereLight {
-            middle: at(position),
-            radius: *radius,
-            radiance: Rgb::from(*radiance),
-        }),
-        document::Light::Environment { radiance, map, rotation, visible, .. } => {
-            Light::Environment(match (radiance, map) {
-                (_, Some(path)) => {
-                    let map = assets
-                        .maps
-                        .get(path)
-                        .ok_or_else(|| format!("the map `{}` is missing", excerpt(path)))?;
-                    Environment::map(map.clone(), world_up, *rotation, *visible)
-                }
-                (radiance, None) => Environment::constant(radiance.map_or(Rgb::BLACK, Rgb::from), *visible),
-            })
-        }
-    })
-}
-
-/// Lights that bring out shape: a warm, soft sun from the upper left in front, and a cool sky as fill light.
-fn default_lights(grid: &Grid) -> Vec<Light> {
-    let AutoFront { front, up, .. } = AutoFront::of(grid);
-    let right = up.cross(front);
-    let travel = right * 0.7 - up * 0.8 - front * 0.6;
-    let sun = Directional::new(travel, Rgb::new(5.0, 4.7, 4.2), 12.0);
-    let sky = Environment::constant(Rgb::new(0.22, 0.25, 0.30), true);
-    vec![Light::Directional(sun), Light::Environment(sky)]
 }
 
 fn camera(document: &Document, volume: &Volume) -> Result<Camera, SceneError> {

@@ -1,8 +1,8 @@
 //! Why a session could not be opened or edited.
 
 use crate::assets::AssetError;
-use crate::build::SceneError;
 use crate::document::DocumentError;
+use crate::scene_error::SceneError;
 
 /// Why a session could not be opened or an edit could not be applied; `at` names the file or the edit.
 #[derive(Debug, thiserror::Error)]

@@ -100,16 +100,15 @@ impl Check {
 
     fn alternatives(&mut self, table: &Map<String, Value>, node: Node, path: &str) {
         if let Some(alternatives) = node.alternatives() {
-            let [a, b] = alternatives.keys;
-            match (table.contains_key(a), table.contains_key(b)) {
-                (true, true) => {
-                    let problem = Problem::new(path, format!("both `{a}` and `{b}`"), "one of them");
-                    self.problems.push(problem.with_fix("leave one of them out"));
-                }
-                (false, false) if alternatives.needed => {
-                    self.report(path, format!("neither `{a}` nor `{b}`"), "one of them");
-                }
-                _ => {}
+            let given: Vec<_> =
+                alternatives.keys.iter().copied().filter(|key| table.contains_key(*key)).collect();
+            if given.len() > 1 {
+                let all = if given.len() == 2 { "both" } else { "all of" };
+                let problem = Problem::new(path, format!("{all} `{}`", given.join("` and `")), "one of them");
+                self.problems.push(problem.with_fix("keep only one"));
+            } else if given.is_empty() && alternatives.needed {
+                let none = format!("neither `{}`", alternatives.keys.join("` nor `"));
+                self.report(path, none, "one of them");
             }
         }
         for (companion, leader) in node.companions() {

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::shape::{Color, ConeAngle, Position, Positive, Vector};
+use super::studio::Studio;
 
 /// A light. It blocks no light, casts no shadow, and may be inside the volume.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -14,6 +15,9 @@ pub enum Light {
         /// Name by which edits find the light.
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whose axes its directions and positions are given in.
+        #[serde(default, skip_serializing_if = "Axes::are_of_world")]
+        axes: Axes,
         /// Direction in which the light travels; any length but 0.
         #[schemars(with = "Vector")]
         direction: [f32; 3],
@@ -30,6 +34,9 @@ pub enum Light {
         /// Name by which edits find the light.
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whose axes its directions and positions are given in.
+        #[serde(default, skip_serializing_if = "Axes::are_of_world")]
+        axes: Axes,
         /// Position of the light, in world units.
         #[schemars(with = "Position")]
         position: [f64; 3],
@@ -42,13 +49,16 @@ pub enum Light {
         /// Name by which edits find the light.
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whose axes its directions and positions are given in.
+        #[serde(default, skip_serializing_if = "Axes::are_of_world")]
+        axes: Axes,
         /// Centre, in world units.
         #[schemars(with = "Position")]
         position: [f64; 3],
         /// Point that the light faces.
         #[schemars(with = "Position")]
         target: [f64; 3],
-        /// Up direction of the rectangle, along which its height is measured; when omitted, the world's up.
+        /// Up direction of the rectangle, along which its height is measured; when omitted, the up axis.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Vector>")]
         up: Option<[f32; 3]>,
@@ -64,6 +74,9 @@ pub enum Light {
         /// Name by which edits find the light.
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whose axes its directions and positions are given in.
+        #[serde(default, skip_serializing_if = "Axes::are_of_world")]
+        axes: Axes,
         /// Centre, in world units.
         #[schemars(with = "Position")]
         position: [f64; 3],
@@ -82,6 +95,9 @@ pub enum Light {
         /// Name by which edits find the light.
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whose axes its directions and positions are given in.
+        #[serde(default, skip_serializing_if = "Axes::are_of_world")]
+        axes: Axes,
         /// Centre, in world units.
         #[schemars(with = "Position")]
         position: [f64; 3],
@@ -92,12 +108,15 @@ pub enum Light {
         #[schemars(with = "Color")]
         radiance: [f32; 3],
     },
-    /// Light from all around: exactly one of a constant `radiance` and a `map`.
-    #[schemars(extend("oneOf" = [{ "required": ["radiance"] }, { "required": ["map"] }]))]
+    /// Light from all around: exactly one of a constant `radiance`, a `map` and a `studio`.
+    #[schemars(extend("oneOf" = [{ "required": ["radiance"] }, { "required": ["map"] }, { "required": ["studio"] }]))]
     Environment {
         /// Name by which edits find the light.
         #[serde(skip_serializing_if = "Option::is_none")]
         name: Option<String>,
+        /// Whose axes its directions and positions are given in.
+        #[serde(default, skip_serializing_if = "Axes::are_of_world")]
+        axes: Axes,
         /// Radiance from every direction, in W m^-2 sr^-1.
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(with = "Option<Color>")]
@@ -106,13 +125,33 @@ pub enum Light {
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(length(min = 1))]
         map: Option<String>,
-        /// Rotation of the surroundings about the world's up, in degrees.
+        /// A gradient with softboxes.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        studio: Option<Studio>,
+        /// Rotation of the surroundings about the up axis, in degrees.
         #[serde(default)]
         rotation: f32,
         /// Whether the camera sees the environment; if not, it sees black.
         #[serde(default = "yes")]
         visible: bool,
     },
+}
+
+/// The axes in which the directions and positions of a light are given.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Axes {
+    /// The world's.
+    #[default]
+    World,
+    /// The camera's, from the centre of the volume: x to the right of the picture, y up, z to the viewer. The light follows the camera.
+    Camera,
+}
+
+impl Axes {
+    fn are_of_world(&self) -> bool {
+        *self == Self::World
+    }
 }
 
 impl Light {
@@ -126,6 +165,19 @@ impl Light {
             | Self::Disk { name, .. }
             | Self::Sphere { name, .. }
             | Self::Environment { name, .. } => name.as_deref(),
+        }
+    }
+
+    /// The axes in which its directions and positions are given.
+    #[must_use]
+    pub fn axes(&self) -> Axes {
+        match self {
+            Self::Directional { axes, .. }
+            | Self::Point { axes, .. }
+            | Self::Rect { axes, .. }
+            | Self::Disk { axes, .. }
+            | Self::Sphere { axes, .. }
+            | Self::Environment { axes, .. } => *axes,
         }
     }
 }

@@ -104,15 +104,14 @@ impl Node {
         self.strings("required")
     }
 
-    /// The two keys of which this table has at most one or, if `needed`, exactly one.
+    /// The keys of which this table has at most one or, if `needed`, exactly one.
     pub(super) fn alternatives(self) -> Option<Alternatives> {
         if let Some(not) = self.keyword("not") {
-            let mut keys = Self(not).required();
-            return Some(Alternatives { keys: [keys.next()?, keys.next()?], needed: false });
+            return Some(Alternatives { keys: Self(not).required().collect(), needed: false });
         }
-        let mut choices = self.keyword("oneOf").filter(|_| self.is_table())?.as_array()?.iter();
-        let mut key = || Self(choices.next()?).required().next();
-        Some(Alternatives { keys: [key()?, key()?], needed: true })
+        let choices = self.keyword("oneOf").filter(|_| self.is_table())?.as_array()?;
+        let keys = choices.iter().flat_map(|choice| Self(choice).required().next()).collect();
+        Some(Alternatives { keys, needed: true })
     }
 
     /// The keys that are only allowed with another one, each with that one, such as `raw` with `path`.
@@ -122,24 +121,18 @@ impl Node {
     }
 }
 
-/// Two keys of a table that exclude each other.
+/// Keys of a table that exclude each other.
 pub(super) struct Alternatives {
-    pub(super) keys: [&'static str; 2],
+    pub(super) keys: Vec<&'static str>,
     /// Whether one of them must be there.
     pub(super) needed: bool,
 }
 
 impl Alternatives {
-    /// The key that `key` excludes.
-    pub(super) fn rival(&self, key: &str) -> Option<&'static str> {
-        let [a, b] = self.keys;
-        if key == a {
-            Some(b)
-        } else if key == b {
-            Some(a)
-        } else {
-            None
-        }
+    /// The keys that `key` excludes.
+    pub(super) fn rivals(&self, key: &str) -> Vec<&'static str> {
+        let others = self.keys.iter().copied().filter(|other| *other != key);
+        if self.keys.contains(&key) { others.collect() } else { Vec::new() }
     }
 }
 
@@ -171,12 +164,13 @@ mod tests {
     fn alternatives_and_companions_come_from_the_schema() {
         let volume = Node::root().key("volume").unwrap();
         let source = volume.alternatives().unwrap();
-        assert_eq!((source.keys, source.needed), (["path", "procedural"], true));
+        assert_eq!((source.keys, source.needed), (vec!["path", "procedural"], true));
         assert_eq!(volume.companions().collect::<Vec<_>>(), [("raw", "path")]);
 
         let function = Node::root().key("transfer_function").unwrap().alternatives().unwrap();
-        assert_eq!((function.keys, function.needed), (["preset", "points"], false));
-        assert_eq!(function.rival("points"), Some("preset"));
+        assert_eq!((&function.keys, function.needed), (&vec!["preset", "points"], false));
+        assert_eq!(function.rivals("points"), ["preset"]);
+        assert!(function.rivals("interpolation").is_empty());
         assert!(Node::root().alternatives().is_none());
     }
 

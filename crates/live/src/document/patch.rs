@@ -73,7 +73,7 @@ pub(super) fn make_way(
         if change.is_null() {
             gone.push(key);
         } else {
-            gone.extend(alternatives.as_ref().and_then(|alternatives| alternatives.rival(key)));
+            gone.extend(alternatives.iter().flat_map(|alternatives| alternatives.rivals(key)));
         }
     }
     for (companion, leader) in node.companions() {

@@ -42,6 +42,8 @@ shapes! {
     MeanCosine = { "type": "number", "format": "float", "exclusiveMinimum": -1, "exclusiveMaximum": 1 };
     /// The full angle of a cone, in degrees.
     ConeAngle = { "type": "number", "format": "float", "minimum": 0, "maximum": 180 };
+    /// The angle from edge to edge of a softbox, in degrees.
+    BoxAngle = { "type": "number", "format": "float", "minimum": 1, "maximum": 180 };
     /// A vertical field of view, in degrees.
     FieldOfView = { "type": "number", "format": "float", "exclusiveMinimum": 0, "exclusiveMaximum": 180 };
     /// An angle above the horizon, in degrees.

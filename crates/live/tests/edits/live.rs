@@ -187,3 +187,67 @@ fn an_edit_rebuilds_only_what_it_touches() {
     let fresh = live.fresh().expect("a session");
     assert!(Arc::ptr_eq(&parts(&fresh).0, &parts(&live).0), "two sessions share voxels");
 }
+
+/// A light of every type in the camera's axes.
+fn lights_of_the_camera() -> Value {
+    json!([
+        { "type": "directional", "axes": "camera", "direction": [1, -2, -3], "irradiance": [3, 2, 1], "angle": 5 },
+        { "type": "point", "axes": "camera", "position": [-14, 20, 11], "intensity": [90, 300, 200] },
+        { "type": "rect", "axes": "camera", "position": [20, 9, 14], "target": [1, 2, 3], "up": [1, 1, 0], "size": [9, 5], "radiance": 4 },
+        { "type": "disk", "axes": "camera", "position": [0, -25, 5], "target": [0, 1, 0], "radius": 6, "radiance": [3, 1, 4] },
+        { "type": "sphere", "axes": "camera", "position": [-4, 3, -22], "radius": 3, "radiance": [9, 5, 5] },
+        { "type": "environment", "axes": "camera", "studio": {
+            "horizon": 0.1, "zenith": [0.2, 0.3, 0.4],
+            "softboxes": [{ "azimuth": -40, "elevation": 30, "size": [40, 20], "radiance": [3, 2, 2] }],
+        } },
+    ])
+}
+
+#[test]
+fn lights_follow_the_camera() {
+    for method in METHODS {
+        let mut document = base(method.name);
+        document["lights"] = lights_of_the_camera();
+        let mut live = opened(&document);
+        refined(&mut live, 2);
+        for patch in [
+            json!({ "camera": { "auto": { "azimuth": 100, "elevation": -30 } } }),
+            json!({ "film": { "exposure": 1 } }),
+            json!({ "camera": { "position": [30, 20, 10], "up": [1, 0, 0] } }),
+        ] {
+            live.edit(&patch).expect("an edit");
+            let fresh = refined(&mut opened(&live.value()), 2);
+            assert_eq!(refined(&mut live, 2), fresh, "{patch}, {}", method.name);
+        }
+    }
+}
+
+/// From the right, the camera's x is the world's -z, and its z, to the viewer, the world's x.
+#[test]
+fn axes_of_the_camera_are_as_documented() {
+    let mut document = base("raymarch");
+    document["camera"] = json!({ "auto": { "azimuth": 90, "elevation": 0 } });
+    document["render"]["raymarch"] = json!({ "shadows": "exact" });
+    let mut world = lights_of_the_camera();
+    for light in world.as_array_mut().expect("lights") {
+        light.as_object_mut().expect("a light").remove("axes");
+        for key in ["direction", "position", "target", "up"] {
+            if let Some([x, y, z]) = light.get(key).and_then(Value::as_array).map(Vec::as_slice) {
+                let turned = json!([z, y, -x.as_f64().expect("a number")]);
+                light[key] = turned;
+            }
+        }
+        if light["type"] == "environment" {
+            light["rotation"] = 90.into();
+        }
+    }
+    let [followed, placed] = [lights_of_the_camera(), world].map(|lights| {
+        document["lights"] = lights;
+        refined(&mut opened(&document), 1)
+    });
+    for (a, b) in followed.rgba.iter().zip(&placed.rgba) {
+        for (x, y) in a.iter().zip(b) {
+            assert!((x - y).abs() < 1e-4 * y.max(0.1), "{a:?} for {b:?}");
+        }
+    }
+}

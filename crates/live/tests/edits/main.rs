@@ -40,7 +40,9 @@ fn scene(value: &Value) -> Scene {
         Interpolation::Linear => VOLUME.clone(),
         Interpolation::Nearest => Arc::new((**VOLUME).clone().with_interpolation(interpolation)),
     };
-    Built::new(document, Assets { volume, maps: BTreeMap::new() }, &THREADS).expect("a scene").scene
+    Built::new(document, Assets { volume, maps: BTreeMap::new(), studios: Vec::new() }, &THREADS)
+        .expect("a scene")
+        .scene
 }
 
 fn base(integrator: &str) -> Value {

@@ -42,7 +42,7 @@ impl AutoFront {
     /// [`AutoView::default_for`] says, with the front and up of their space.
     #[must_use]
     pub fn of(grid: &Grid) -> Self {
-        let (up, front) = (grid.space().up(), front_of(grid.space()));
+        let (up, front) = (grid.space().up(), grid.space().front());
         let Some(across) = thin_axis(grid) else {
             return Self { view: AutoView::default_for(grid.space()), front, up };
         };
@@ -63,14 +63,6 @@ impl AutoFront {
         let up_in_picture = if level { -front * elevation.signum() } else { up };
         let up = (up_in_picture - across * up_in_picture.dot(across)).normalize();
         Self { view: AutoView { azimuth, elevation, zoom: 1.0 }, front: across, up }
-    }
-}
-
-/// The front of a space: the patient's face (LPS), or +z.
-fn front_of(space: Space) -> Vec3 {
-    match space {
-        Space::Anatomical => -Vec3::Y,
-        Space::Plain => Vec3::Z,
     }
 }
 
@@ -123,7 +115,7 @@ const MARGIN: f32 = 0.04;
 pub fn fit(grid: &Grid, view: AutoView, up: Option<Vec3>, lens: FitLens, size: [u32; 2]) -> Camera {
     let chosen_up = up;
     let up = grid.space().up();
-    let front = front_of(grid.space());
+    let front = grid.space().front();
     let right = up.cross(front);
     let (sin_a, cos_a) = view.azimuth.to_radians().sin_cos();
     let (sin_e, cos_e) = view.elevation.to_radians().sin_cos();

@@ -57,6 +57,12 @@ impl Camera {
         self.frame.w
     }
 
+    /// Unit vectors: `u` to the right of the picture, `v` to its top, `w` in the view direction.
+    #[must_use]
+    pub fn frame(&self) -> Frame {
+        self.frame
+    }
+
     /// The lens.
     #[must_use]
     pub fn lens(&self) -> Lens {

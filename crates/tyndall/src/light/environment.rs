@@ -46,12 +46,10 @@ impl Environment {
         Self { sky: Sky::Constant(radiance), visible }
     }
 
-    /// A map around the axis `up` (unit). Its middle column is straight ahead of an upright viewer
-    /// who faces -z (+y when +z is up), turned by `rotation` degrees to that viewer's left;
-    /// what is right of it in the map is to the viewer's right.
+    /// A map whose middle column is straight `ahead` of an upright viewer and whose top is `up`, unit vectors at right angles, turned about
+    /// `up` by `rotation` degrees to that viewer's left; what is right of the middle column in the map is to the viewer's right.
     #[must_use]
-    pub fn map(map: Arc<Map>, up: Vec3, rotation: f32, visible: bool) -> Self {
-        let ahead = if up.z.abs() > 0.5 { Vec3::Y } else { -Vec3::Z };
+    pub fn map(map: Arc<Map>, ahead: Vec3, up: Vec3, rotation: f32, visible: bool) -> Self {
         let (sin, cos) = rotation.to_radians().sin_cos();
         let u = ahead * cos + up.cross(ahead) * sin;
         Self { sky: Sky::Map { map, frame: Frame { u, v: up.cross(u), w: up } }, visible }

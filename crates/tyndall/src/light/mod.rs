@@ -9,6 +9,7 @@ mod enclosure;
 mod environment;
 mod point;
 mod set;
+mod studio;
 mod triangle;
 
 pub use area::{Disk, Rect, SphereLight};
@@ -19,6 +20,7 @@ pub use enclosure::Enclosure;
 pub use environment::{Environment, Map, MapError};
 pub use point::PointLight;
 pub use set::LightSet;
+pub use studio::{Softbox, Studio};
 
 use crate::math::{Ray, Rgb, Vec3};
 

@@ -21,6 +21,15 @@ impl Space {
             Self::Plain => Vec3::Y,
         }
     }
+
+    /// The direction towards whoever looks at its front, a unit vector: out of the patient's face (LPS), or +z.
+    #[must_use]
+    pub fn front(self) -> Vec3 {
+        match self {
+            Self::Anatomical => -Vec3::Y,
+            Self::Plain => Vec3::Z,
+        }
+    }
 }
 
 /// A regular grid of voxels: index space has integer coordinates at voxel centres, and

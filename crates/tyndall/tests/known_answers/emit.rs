@@ -278,7 +278,7 @@ pub fn lights() -> Vec<(&'static str, Light)> {
         ("sphere inside", sphere(inner, 0.1)),
         ("sphere half inside", sphere(Vec3::new(0.4, 0.9, -0.4), 0.2)),
         ("sky", Light::Environment(Environment::constant(color, true))),
-        ("map", Light::Environment(Environment::map(map, Vec3::Z, 30.0, true))),
+        ("map", Light::Environment(Environment::map(map, Vec3::Y, Vec3::Z, 30.0, true))),
     ]
 }
 
@@ -295,8 +295,9 @@ fn a_colour_changes_no_path_and_anything_else_does() {
     let disk = |at, to, radius, color| Light::Disk(Disk::new(at, to, radius, color));
     let sphere = |middle, radius, radiance| Light::Sphere(SphereLight { middle, radius, radiance });
     let sky = |color| Light::Environment(Environment::constant(color, true));
-    let maps =
-        |map: &Arc<Map>, up, turn| Light::Environment(Environment::map(Arc::clone(map), up, turn, true));
+    let maps = |map: &Arc<Map>, up, turn| {
+        Light::Environment(Environment::map(Arc::clone(map), -Vec3::Z, up, turn, true))
+    };
     let (red, white) = (Rgb::new(3.0, 0.0, 0.1), Rgb::WHITE);
     // For each kind a light, the same one in another colour, and different ones.
     let kinds = [

@@ -3,7 +3,9 @@
 use crate::scenes::mean;
 use std::f64::consts::PI;
 use std::sync::Arc;
-use tyndall::light::{Directional, Disk, Environment, Light, Map, PointLight, Rect, SphereLight};
+use tyndall::light::{
+    Directional, Disk, Environment, Light, Map, PointLight, Rect, Softbox, SphereLight, Studio,
+};
 use tyndall::math::{Ray, Rgb, Vec3};
 use tyndall_testing::ChiSquare;
 
@@ -18,7 +20,7 @@ fn lights_with_an_extent() -> Vec<(&'static str, Light)> {
         ("disk", Light::Disk(Disk::new(at, Vec3::new(-0.2, -1.0, 0.1), 0.7, Rgb::WHITE))),
         ("sphere", Light::Sphere(SphereLight { middle: at, radius: 0.6, radiance: Rgb::WHITE })),
         ("sky", Light::Environment(Environment::constant(Rgb::WHITE, true))),
-        ("map", Light::Environment(Environment::map(map, Vec3::Z, 30.0, true))),
+        ("map", Light::Environment(Environment::map(map, Vec3::Y, Vec3::Z, 30.0, true))),
     ]
 }
 
@@ -103,7 +105,8 @@ fn a_map_is_oriented_as_documented() {
         Arc::new(Map::new(64, 32, texels).unwrap())
     };
     let brightest = |map, up: Vec3, rotation| {
-        let sky = Light::Environment(Environment::map(map, up, rotation, true));
+        let ahead = if up == Vec3::Z { Vec3::Y } else { -Vec3::Z };
+        let sky = Light::Environment(Environment::map(map, ahead, up, rotation, true));
         sky.sample(Vec3::ZERO, [0.5, 0.5]).unwrap().direction
     };
     let near = |found: Vec3, expected: Vec3| {
@@ -115,4 +118,82 @@ fn a_map_is_oriented_as_documented() {
     near(brightest(texel_at(32, 16), Vec3::Y, 90.0), -Vec3::X);
     near(brightest(texel_at(32, 16), Vec3::Z, 0.0), Vec3::Y);
     near(brightest(texel_at(48, 16), Vec3::Z, 0.0), Vec3::X);
+}
+
+/// Lamps of a studio shine from where the documentation says, as wide and as bright as they are.
+#[test]
+fn a_studio_is_lit_as_described() {
+    let lamp = |azimuth, elevation| Softbox {
+        azimuth,
+        elevation,
+        size: [20.0, 10.0],
+        softness: 0.0,
+        radiance: Rgb::splat(50.0),
+    };
+    let sky = |lamps: &[Softbox], ahead, up| {
+        let (zenith, horizon, ground) = (Rgb::splat(3.0), Rgb::splat(2.0), Rgb::splat(1.0));
+        let studio = Studio { zenith, horizon, ground, softboxes: lamps.to_vec() };
+        Environment::map(Arc::new(studio.map().unwrap()), ahead, up, 0.0, true)
+    };
+    for (ahead, up) in [(Vec3::Y, Vec3::Z), (-Vec3::Z, Vec3::Y)] {
+        let right = ahead.cross(up);
+        let s = 0.5_f32.sqrt();
+        for (azimuth, elevation, expected) in [
+            (0.0, 0.0, -ahead),
+            (90.0, 0.0, right),
+            (180.0, 0.0, ahead),
+            (-90.0, 0.0, -right),
+            (0.0, 45.0, (up - ahead) * s),
+            (90.0, -45.0, (right - up) * s),
+            (37.0, 90.0, up),
+        ] {
+            let sky = sky(&[lamp(azimuth, elevation)], ahead, up);
+            let found = sky.radiance(expected).g;
+            assert!((50.0..54.0).contains(&found), "{found} from {azimuth}, {elevation}");
+            assert!(sky.radiance(-expected).g <= 3.0, "behind {azimuth}, {elevation}");
+        }
+        let sky = sky(&[lamp(0.0, 0.0)], ahead, up);
+        // Half of 20 degrees across and of 10 upwards, to within a texel.
+        for (axis, half) in [(right, 10.0_f32), (up, 5.0)] {
+            for (angle, lit) in [(half - 1.0, true), (half + 1.0, false)] {
+                let (sin, cos) = angle.to_radians().sin_cos();
+                let found = sky.radiance(axis * sin - ahead * cos).g;
+                assert!((found > 30.0) == lit, "{found} at {angle} along {axis}");
+            }
+        }
+        for (direction, expected) in [(up, 3.0), (ahead, 2.0), (-up, 1.0), ((up + ahead) * s, 2.0 + s)] {
+            let found = sky.radiance(direction).g;
+            assert!((found - expected).abs() < 0.02, "{found} for {expected} from {direction}");
+        }
+    }
+}
+
+/// The irradiance of a soft lamp straight above: of radiance times cosine over its solid angle, and of a gradient.
+#[test]
+fn a_studio_has_the_irradiance_of_its_lamps() {
+    let lamp = Softbox {
+        azimuth: 0.0,
+        elevation: 90.0,
+        size: [40.0, 24.0],
+        softness: 0.6,
+        radiance: Rgb::splat(10.0),
+    };
+    let studio =
+        Studio { zenith: Rgb::WHITE, horizon: Rgb::BLACK, ground: Rgb::BLACK, softboxes: vec![lamp] };
+    let sky = Environment::map(Arc::new(studio.map().unwrap()), Vec3::Y, Vec3::Z, 0.0, true);
+    let ramp = |angle: f64, half: f64| {
+        let t = (0.5 - (angle.to_degrees().abs() / half - 1.0) / 0.6).clamp(0.0, 1.0);
+        t * t * (3.0 - 2.0 * t)
+    };
+    // Over the plane above, where both angles are those to the axes: cos^4 dx dy.
+    let (steps, most) = (600, 0.6);
+    let at = |i: u32| (f64::from(i) + 0.5) / f64::from(steps) * 2.0 * most - most;
+    let mut of_lamp = 0.0;
+    for (x, y) in (0..steps).flat_map(|i| (0..steps).map(move |k| (at(i), at(k)))) {
+        of_lamp += 10.0 * ramp(x.atan(), 20.0) * ramp(y.atan(), 12.0) / (1.0 + x * x + y * y).powi(2);
+    }
+    of_lamp *= (2.0 * most / f64::from(steps)).powi(2);
+    // The gradient is the cosine: 2 pi integral cos^2 d cos = 2 pi / 3.
+    let expected = of_lamp + 2.0 * PI / 3.0;
+    irradiance(&Light::Environment(sky), Vec3::Z, 1_000_000).against(expected).assert_within(3.5, 3e-3);
 }

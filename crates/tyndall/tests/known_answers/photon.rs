@@ -193,7 +193,7 @@ fn lights_of_every_kind() {
         ("disk", Light::Disk(Disk::new(away, Vec3::new(-1.0, 0.2, -1.0), 0.6, white))),
         ("sphere", Light::Sphere(SphereLight { middle: away, radius: 0.5, radiance: white })),
         ("sky", sky(Environment::constant(white, false))),
-        ("map", sky(Environment::map(map, Vec3::Z, 30.0, true))),
+        ("map", sky(Environment::map(map, Vec3::Y, Vec3::Z, 30.0, true))),
     ];
     for (name, light) in lights {
         let scene = seen(Setup { lights: vec![light], ..sunny(0.7) }, ASIDE, Vec3::ZERO, 1.6);

@@ -67,7 +67,7 @@ fn adding_doubling_diffuse() {
     let texels = (0..rows).map(|y| if y < rows / 2 { Rgb::WHITE } else { Rgb::BLACK }).collect();
     let map = Arc::new(Map::new(1, rows, texels).unwrap());
     let mut setup = slab(4.0, 0.9, henyey_greenstein(0.0));
-    setup.lights = vec![Light::Environment(Environment::map(map, Vec3::Z, 0.0, false))];
+    setup.lights = vec![Light::Environment(Environment::map(map, Vec3::Y, Vec3::Z, 0.0, false))];
     let scene = setup.scene();
     assert_flux(&scene, 1.0, PI, 0.0, 0.47319, 2_000_000);
     // Unscattered light, 2 E3(4), is not seen either: the map is invisible.

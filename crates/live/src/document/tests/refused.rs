@@ -102,6 +102,11 @@ fn alternatives_exclude_each_other() {
         (json!({ "transfer_function": { "preset": "a", "points": [point(0.0)] } }), "transfer_function"),
         (json!({ "camera": { "position": [0, 0, 1], "auto": {} } }), "camera"),
         (json!({ "lights": [{ "type": "environment", "radiance": 1, "map": "a.exr" }] }), "lights.0"),
+        (json!({ "lights": [{ "type": "environment", "map": "a.exr", "studio": {} }] }), "lights.0"),
+        (
+            json!({ "lights": [{ "type": "environment", "radiance": 1, "map": "a", "studio": {} }] }),
+            "lights.0",
+        ),
         (json!({ "camera": { "target": [0, 0, 1] } }), "camera.target"),
         (json!({ "camera": { "target": [0, 0, 1], "auto": {} } }), "camera.target"),
     ] {

@@ -1,7 +1,7 @@
 //! Presets that find their thresholds in the histogram.
 
 use super::{Profile, labels, matter};
-use crate::math::cast;
+use crate::math::{Rgb, cast};
 use crate::transfer::Point;
 use crate::volume::Volume;
 
@@ -104,12 +104,37 @@ pub(super) fn solid(profile: &Profile) -> Vec<Point> {
     ])
 }
 
-pub(super) fn cloud(profile: &Profile) -> Vec<Point> {
+/// The share of the range up to which values are background.
+fn floor(profile: &Profile) -> f64 {
     // The most common value is the background if it is near the bottom, as it usually is.
     let counts = &profile.histogram.counts;
     let mode = (0..counts.len()).max_by_key(|&i| counts[i]).unwrap_or(0) as f64 / counts.len() as f64;
-    let floor = if mode < 0.3 { mode + 0.02 } else { 0.0 };
-    ascending(vec![matter(profile.at(floor), 0.0, WHITE, 0.0), matter(profile.at(1.0), 1.0, WHITE, 0.0)])
+    if mode < 0.3 { mode + 0.02 } else { 0.0 }
+}
+
+pub(super) fn cloud(profile: &Profile) -> Vec<Point> {
+    let floor = profile.at(floor(profile));
+    ascending(vec![matter(floor, 0.0, WHITE, 0.0), matter(profile.at(1.0), 1.0, WHITE, 0.0)])
+}
+
+/// Glow of a dye whose concentration is the value, in matter that scatters little.
+pub(super) fn fluorescence(profile: &Profile) -> Vec<Point> {
+    /// Shares of the values above the background, with opacity and radiance.
+    const DYE: [(f64, f32, [f32; 3]); 5] = [
+        (0.0, 0.0, [0.0, 0.02, 0.05]),
+        (0.2, 0.04, [0.01, 0.10, 0.22]),
+        (0.45, 0.25, [0.03, 0.55, 0.50]),
+        (0.75, 0.7, [0.25, 1.5, 0.9]),
+        (1.0, 1.0, [1.6, 2.4, 1.5]),
+    ];
+    const ALBEDO: [f32; 3] = [0.2; 3];
+    let floor = floor(profile);
+    let point = |(share, opacity, emission): (f64, f32, [f32; 3])| {
+        let mut point = matter(profile.at(floor + (1.0 - floor) * share), opacity, ALBEDO, 0.0);
+        point.optics.emission = Rgb::from(emission);
+        point
+    };
+    ascending(DYE.map(point).to_vec())
 }
 
 pub(super) fn layers(profile: &Profile) -> Vec<Point> {

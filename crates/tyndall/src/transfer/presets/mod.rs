@@ -43,7 +43,7 @@ pub enum PresetError {
 }
 
 /// All presets.
-pub const PRESETS: [Preset; 12] = [
+pub const PRESETS: [Preset; 13] = [
     Preset { name: "ct-bone", about: "CT: bone alone, as a solid", points: Points::Fixed(ct::bone) },
     Preset {
         name: "ct-skin-bone",
@@ -84,6 +84,11 @@ pub const PRESETS: [Preset; 12] = [
         name: "cloud",
         about: "any data: extinction in proportion to the value",
         points: Points::Adaptive(adaptive::cloud),
+    },
+    Preset {
+        name: "fluorescence",
+        about: "any data: glow that grows with the value, as of a dye under the microscope",
+        points: Points::Adaptive(adaptive::fluorescence),
     },
     Preset {
         name: "layers",
