@@ -50,8 +50,12 @@ pub enum Command {
     Info(InfoOptions),
     /// Measure this machine: speed as ratios, latency, growth
     Bench(BenchOptions),
+    /// Render every look that suits a volume on one page
+    Sheet(SheetOptions),
     /// List the transfer-function presets
     Presets,
+    /// List the looks
+    Looks,
     /// Print the JSON Schema of the scene document
     Schema,
     /// Print a completion script for a shell
@@ -114,6 +118,10 @@ pub struct RenderOptions {
     /// How it runs.
     #[command(flatten)]
     pub run: RunOptions,
+
+    /// Save the look of the scene, as all options make it, to FILE (.toml or .json), for --look
+    #[arg(long, value_name = "FILE")]
+    pub save_look: Option<PathBuf>,
 
     /// Show progress even when standard error is not a terminal
     #[arg(long)]
@@ -191,6 +199,12 @@ pub struct SceneOptions {
           value_parser = value_parser!(u32).range(..=MOST_SCATTER))]
     pub max_scatter: Option<u32>,
 
+    /// Give it a look: one that `tyndall looks` lists, or a FILE with one
+    ///
+    /// A look is a merge patch on the scene, which is applied before all other options: lights, transfer function, background, tone, lens, method.
+    #[arg(long, value_name = "NAME or FILE", help_heading = "Scene")]
+    pub look: Option<String>,
+
     /// Use this transfer function; `tyndall presets` lists them
     #[arg(long, value_name = "NAME", help_heading = "Scene", hide_possible_values = true,
           value_parser = PossibleValuesParser::new(PRESETS.map(|preset| preset.name)))]
@@ -201,6 +215,33 @@ pub struct SceneOptions {
     /// VALUE is parsed as JSON, else taken as a string. The other options take precedence.
     #[arg(long, value_name = "PATH=VALUE", help_heading = "Scene")]
     pub set: Vec<String>,
+}
+
+/// Options of `sheet`.
+#[derive(Debug, Group)]
+pub struct SheetOptions {
+    /// A volume, a scene or a picture that Tyndall made
+    pub input: PathBuf,
+
+    /// Write the page to FILE (PNG)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+
+    /// Width and height of each picture in pixels
+    #[arg(long, value_name = "WxH", value_parser = size, default_value = "320x320")]
+    pub size: [u32; 2],
+
+    /// Samples per pixel [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=MOST_SAMPLES))]
+    pub samples: Option<u32>,
+
+    /// Threads [default: one per processor]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=MOST_THREADS))]
+    pub threads: Option<u16>,
+
+    /// No progress
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// Options that do not change the picture.

@@ -2,6 +2,7 @@
 
 mod args;
 mod bench;
+mod canvas;
 mod edits;
 mod failure;
 mod info;
@@ -15,6 +16,7 @@ mod progress;
 mod render;
 mod replay;
 mod reserve;
+mod sheet;
 mod stats;
 
 use args::{Args, Command};
@@ -34,7 +36,9 @@ fn main() -> ExitCode {
         Command::Merge(options) => merge::run(&options),
         Command::Info(options) => info::run(&options),
         Command::Bench(options) => bench::run(&options),
+        Command::Sheet(options) => sheet::run(&options),
         Command::Presets => lists::presets(),
+        Command::Looks => lists::looks(),
         Command::Schema => lists::schema(),
         Command::Completions { shell } => {
             let mut script = Vec::new();

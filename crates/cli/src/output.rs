@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use tyndall::film::{Film, Image};
 use tyndall_formats::image::{Metadata, Picture, encode_png, keeps_transparency, read_metadata, write};
 use tyndall_live::document::{Background, Document, Light};
+use tyndall_live::look_text;
 
 /// The name of standard output.
 const STDOUT: &str = "-";
@@ -54,9 +55,9 @@ fn check_replaceable(path: &Path, input: &Path) -> Result<(), Failure> {
 }
 
 /// Refuses, before any work, paths that cannot be written and paths that are named twice.
-pub fn check(pictures: &[PathBuf], statistics: Option<&Path>) -> Result<(), Failure> {
+pub fn check(pictures: &[PathBuf], statistics: Option<&Path>, look: Option<&Path>) -> Result<(), Failure> {
     let mut taken = BTreeSet::new();
-    for path in pictures.iter().map(PathBuf::as_path).chain(statistics) {
+    for path in pictures.iter().map(PathBuf::as_path).chain(statistics).chain(look) {
         if !taken.insert(absolute(path)) {
             let path = tyndall::message::path_name(path);
             return Err(Failure::usage(format!(
@@ -67,9 +68,13 @@ pub fn check(pictures: &[PathBuf], statistics: Option<&Path>) -> Result<(), Fail
     for path in pictures.iter().filter(|p| p.as_os_str() != STDOUT) {
         tyndall_formats::image::check_destination(path).map_err(Failure::usage)?;
     }
-    match statistics.filter(|p| p.as_os_str() != STDOUT) {
+    if let Some(path) = statistics.filter(|p| p.as_os_str() != STDOUT) {
+        tyndall_formats::atomic::check(path)
+            .map_err(|e| Failure::usage(format!("--stats {}", unwritable(path, &e))))?;
+    }
+    match look {
         Some(path) => tyndall_formats::atomic::check(path)
-            .map_err(|e| Failure::usage(format!("--stats {}", unwritable(path, &e)))),
+            .map_err(|e| Failure::usage(format!("--save-look {}", look_unwritable(path, &e)))),
         None => Ok(()),
     }
 }
@@ -202,6 +207,17 @@ pub fn statistics(path: &Path, value: &serde_json::Value) -> Result<(), Failure>
         return say(&text);
     }
     tyndall_formats::atomic::replace(path, text.as_bytes()).map_err(|e| Failure::input(unwritable(path, &e)))
+}
+
+/// Writes a look, as JSON if the extension says so, else as TOML.
+pub fn look(path: &Path, look: &serde_json::Value) -> Result<(), Failure> {
+    tyndall_formats::atomic::replace(path, look_text(path, look).as_bytes())
+        .map_err(|e| Failure::input(look_unwritable(path, &e)))
+}
+
+fn look_unwritable(path: &Path, error: &std::io::Error) -> String {
+    let path = tyndall::message::path_name(path);
+    format!("{path}: the look cannot be written: {error}; name a file in a writable folder")
 }
 
 fn unwritable(path: &Path, error: &std::io::Error) -> String {

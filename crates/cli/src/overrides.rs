@@ -2,12 +2,16 @@
 
 use crate::Failure;
 use crate::args::SceneOptions;
-use serde_json::json;
+use serde_json::{Value, json};
+use std::path::Path;
 use tyndall::message::excerpt;
-use tyndall_live::Input;
+use tyndall_live::{Input, LOOKS, Look, read_look};
 
-/// Applies the options to the document: `--set` in the given order, then the others.
+/// Applies the options to the document: the look, `--set` in the given order, then the others.
 pub fn lay_over(input: &mut Input, options: &SceneOptions, samples: Option<u32>) -> Result<(), Failure> {
+    if let Some(look) = &options.look {
+        input.patch(&look_named(look)?).map_err(Failure::input)?;
+    }
     for assignment in &options.set {
         input.set(assignment).map_err(|e| Failure::usage(format!("--set {}: {e}", excerpt(assignment))))?;
     }
@@ -31,4 +35,20 @@ pub fn lay_over(input: &mut Input, options: &SceneOptions, samples: Option<u32>)
         patch["transfer_function"]["preset"] = preset.as_str().into();
     }
     input.patch(&patch).map_err(Failure::input)
+}
+
+/// The look of that name, or else in that file.
+fn look_named(name: &str) -> Result<Value, Failure> {
+    if let Some(look) = Look::named(name) {
+        return Ok(look.patch());
+    }
+    let path = Path::new(name);
+    if path.exists() || path.extension().is_some() {
+        return read_look(path).map_err(Failure::input);
+    }
+    let known = LOOKS.iter().map(|look| look.name).collect::<Vec<_>>().join(", ");
+    Err(Failure::usage(format!(
+        "--look {}: no look and no file of that name; known looks are {known}",
+        excerpt(name)
+    )))
 }

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tyndall::film::Film;
 use tyndall::message::{path_name, sentence};
-use tyndall_live::{Budget, Input, LiveSession, Options};
+use tyndall_live::{Budget, Input, LiveSession, Options, look_of};
 
 /// How often progress is checked.
 const SLICE: Duration = Duration::from_millis(100);
@@ -45,7 +45,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let level = vector_instructions()?;
     let mut input = Input::open(&options.input).map_err(Failure::input)?;
     let paths = output::paths(&options.outputs, &options.input)?;
-    output::check(&paths, options.run.stats.as_deref())?;
+    output::check(&paths, options.run.stats.as_deref(), options.save_look.as_deref())?;
     if options.part.is_some() {
         output::check_exr(&paths, "--part")?;
     }
@@ -55,10 +55,14 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let stored = options.resume.as_deref().map(StoredRender::open).transpose()?;
 
     overrides::lay_over(&mut input, &options.scene, options.samples)?;
+    let look = options.save_look.as_ref().map(|path| (path, look_of(&input.value, &input.folder)));
     let on = Options { threads: threads.clone(), level, edits: false };
     let loaded = input.load(&on).map_err(Failure::input)?;
     let load_s = stages.end("load");
     let mut live = LiveSession::of(loaded, on).map_err(Failure::input)?;
+    if let Some((path, look)) = look {
+        output::look(path, &look)?;
+    }
     if !options.run.quiet {
         let of_outputs = output::notes(&paths, live.document());
         for text in live.notes().iter().chain(&of_outputs) {

@@ -14,6 +14,7 @@ mod flat_images;
 mod gradients;
 mod kinds;
 mod labels;
+mod looks;
 mod narrow_peaks;
 mod no_data;
 mod parts;

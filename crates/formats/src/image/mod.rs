@@ -134,6 +134,19 @@ pub fn encode_png(picture: &Picture, tone: &Tone, metadata: &Metadata) -> Result
     png::encode(picture, tone, metadata).map_err(|failure| failure.at(Path::new("standard output")))
 }
 
+/// Writes code values, rows from the top, as a PNG file without metadata.
+///
+/// # Errors
+/// [`ImageError::TooLarge`] beyond what the kind can hold, [`ImageError::Unwritable`] if the file cannot be written.
+///
+/// # Panics
+/// If there are not as many codes as pixels.
+pub fn write_codes(path: &Path, [width, height]: [u32; 2], codes: &[[u8; 3]]) -> Result<(), ImageError> {
+    assert_eq!(codes.len(), width as usize * height as usize, "pixels and their codes");
+    let bytes = png::encode_codes([width, height], codes).map_err(|failure| failure.at(path))?;
+    atomic::replace(path, &bytes).map_err(|source| ImageError::unwritable(path, source))
+}
+
 /// The metadata in a picture of any of the four kinds, recognised by content; `None` if it has none of ours.
 ///
 /// Pixels are not read, so that a picture with damaged pixels still yields its scene.

@@ -38,6 +38,21 @@ fn try_encode(picture: &Picture, tone: &Tone, metadata: &Metadata) -> Result<Vec
     Ok(bytes)
 }
 
+pub(super) fn encode_codes([width, height]: [u32; 2], codes: &[[u8; 3]]) -> Result<Vec<u8>, EncodeFailure> {
+    let encode = || {
+        let mut bytes = Vec::new();
+        let mut encoder = Encoder::new(&mut bytes, width, height);
+        encoder.set_color(ColorType::Rgb);
+        encoder.set_depth(BitDepth::Eight);
+        encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(codes.as_flattened())?;
+        writer.finish()?;
+        Ok(bytes)
+    };
+    encode().map_err(|error: EncodingError| EncodeFailure::library(&error))
+}
+
 pub(super) fn read_metadata(file: impl BufRead + Seek) -> Result<Metadata, String> {
     let decoder = Decoder::new_with_limits(file, png::Limits { bytes: TEXT_LIMIT });
     let reader = decoder.read_info().map_err(|error| error.to_string())?;
