@@ -192,7 +192,10 @@ fn maps(
 }
 
 /// The maps of a document's studios; those in `known` are not computed again.
-fn studios(document: &Document, known: &[StudioMap]) -> Result<Vec<StudioMap>, AssetError> {
+///
+/// # Errors
+/// [`AssetError::Studio`] if lamps together are too bright.
+pub fn studios(document: &Document, known: &[StudioMap]) -> Result<Vec<StudioMap>, AssetError> {
     let mut studios: Vec<StudioMap> = Vec::new();
     for (light, l) in document.lights.iter().flatten().enumerate() {
         let document::Light::Environment { studio: Some(studio), .. } = l else { continue };

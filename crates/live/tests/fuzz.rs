@@ -18,7 +18,7 @@ use tyndall::session::{Budget, Session};
 use tyndall::volume::procedural::{Field, Kind};
 use tyndall::volume::{Grid, Space, ValueMap, Volume, Voxels};
 use tyndall_live::document::{Document, apply, set, value_from_json, value_from_toml};
-use tyndall_live::{Assets, Built};
+use tyndall_live::{Assets, Built, assets};
 use tyndall_testing::damage::{Edit, NUMBERS};
 use tyndall_testing::within_limits;
 
@@ -126,7 +126,8 @@ fn try_scene(text: &str, json: bool, volume: Arc<Volume>) -> Result<(), String> 
     document.render.max_scatter = document.render.max_scatter.min(50);
     document.render.draft();
     let names = ["map.exr", "a.hdr"].map(|name| (name.to_owned(), MAP.clone()));
-    let assets = Assets { volume, maps: BTreeMap::from(names) };
+    let studios = assets::studios(&document, &[]).map_err(|e| helpful(&e))?;
+    let assets = Assets { volume, maps: BTreeMap::from(names), studios };
     let scene = Built::new(document, assets, &THREADS).map_err(|e| helpful(&e))?.scene;
     let mut session = Session::new(scene, THREADS.clone());
     session.refine(&Budget::samples(2));

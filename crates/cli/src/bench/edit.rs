@@ -203,14 +203,19 @@ impl Cost {
         self.shares.photons * photons + share_of_segments * segments
     }
 
-    /// The speed-up if the edit took no longer than [`Self::due`].
-    pub fn bound(&self) -> f64 {
-        self.scratch.stages.sum() / self.due().max(1e-9)
+    /// The speed-up if the edit took no longer than [`Self::due`]; `None` where nothing is computed again, which allows any.
+    pub fn bound(&self) -> Option<f64> {
+        self.bound_for(self.shares.segments)
     }
 
     /// The same, with each segment weighted by its number of gathers.
-    pub fn bound_by_gathers(&self) -> f64 {
-        self.scratch.stages.sum() / self.due_for(self.gathers).max(1e-9)
+    pub fn bound_by_gathers(&self) -> Option<f64> {
+        self.bound_for(self.gathers)
+    }
+
+    fn bound_for(&self, share_of_segments: f64) -> Option<f64> {
+        let due = self.due_for(share_of_segments);
+        (due > 0.0).then(|| self.scratch.stages.sum() / due)
     }
 }
 

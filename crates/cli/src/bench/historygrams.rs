@@ -111,13 +111,15 @@ fn row(table: &'static str, name: &str, cost: &Cost, paper: Option<&Paper>, want
     ];
     let speed_up = ratio("speed-up", cost.speed_up()).beside(of(&|p| p.speed_up));
     rows.push(if let Some(wanted) = wanted { speed_up.at_least(wanted) } else { speed_up });
-    rows.push(ratio("speed-up that the shares allow", cost.bound()));
-    rows.push(ratio("reached of what they allow", cost.speed_up() / cost.bound()).at_least(OF_BOUND));
+    if let Some(bound) = cost.bound() {
+        rows.push(ratio("speed-up that the shares allow", bound));
+        rows.push(ratio("reached of what they allow", cost.speed_up() / bound).at_least(OF_BOUND));
+    }
     rows.push(share("gathers made again", cost.gathers));
-    rows.push(ratio("speed-up that the gathers allow", cost.bound_by_gathers()));
-    rows.push(
-        ratio("reached of what those allow", cost.speed_up() / cost.bound_by_gathers()).at_least(OF_BOUND),
-    );
+    if let Some(bound) = cost.bound_by_gathers() {
+        rows.push(ratio("speed-up that the gathers allow", bound));
+        rows.push(ratio("reached of what those allow", cost.speed_up() / bound).at_least(OF_BOUND));
+    }
     let allowed = LATENCY_FACTOR * cost.due() + LATENCY_SECONDS;
     rows.push(ratio("latency over 1.3 x due + 60 ms", cost.edit.total / allowed).at_most(1.0));
     if let Some(plain) = cost.plain {

@@ -50,7 +50,9 @@ pub fn seeds() -> &'static [Value] {
                 "medium": { "phase": { "type": "schlick", "k": -0.5 }, "brdf": { "type": "ashikhmin-shirley" } },
                 "lights": [
                     { "type": "environment", "map": "map.exr", "rotation": 30.0, "visible": false },
-                    { "type": "directional", "direction": [1.0, 1.0, 1.0], "irradiance": 1.0 } ],
+                    { "type": "directional", "axes": "camera", "direction": [1.0, 1.0, 1.0], "irradiance": 1.0 },
+                    { "type": "environment", "axes": "camera", "studio": { "zenith": 1.0, "horizon": [0.1, 0.2, 0.3], "ground": 0.0,
+                        "softboxes": [{ "azimuth": -30.0, "elevation": 40.0, "size": [30.0, 20.0], "softness": 0.5, "radiance": 9.0 }] } } ],
                 "camera": { "type": "orthographic", "height": 5.0,
                     "auto": { "azimuth": 30.0, "elevation": 20.0, "zoom": 1.0 } },
                 "film": { "size": [4, 4], "background": [1.0, 0.0, 0.0], "tone": "reinhard" },

@@ -49,15 +49,8 @@ impl Slab {
         }
     }
 
-    /// Goes on to the next layer of bricks; false if there is none. In parallel on the current pool.
-    pub fn advance(
-        &mut self,
-        course: &Course,
-        lattice: &Lattice,
-        bricks: &Bricks,
-        medium: &Medium,
-        level: Level,
-    ) -> bool {
+    /// Goes on to the next layer of bricks, whose planes are then to be filled; false if there is none.
+    pub fn advance(&mut self, course: &Course, bricks: &Bricks) -> bool {
         let [nu, nv, nw] = course.texels;
         let first = self.first + self.count;
         if first >= nw {
@@ -71,14 +64,26 @@ impl Slab {
         for (row, span) in self.spans.iter_mut().enumerate() {
             *span = span_of(course, bricks, layer, row);
         }
+        true
+    }
+
+    /// Finds the matter at the `m`-th plane of the layer. In parallel on the current pool.
+    pub fn fill(
+        &mut self,
+        m: usize,
+        course: &Course,
+        lattice: &Lattice,
+        bricks: &Bricks,
+        medium: &Medium,
+        level: Level,
+    ) {
+        let [nu, nv, _] = course.texels;
+        let (layer, plane) = (self.layer, course.plane(self.first + m));
         let parts = Parts::new(lattice.spacing(), medium);
-        let rows = self.extinction[nu * nv..].par_chunks_exact_mut(nu).take(self.count * nv);
-        rows.with_min_len(16).enumerate().for_each(|(i, row)| {
-            let (m, v) = (i / nv, i % nv);
-            let plane = course.plane(first + m);
+        let rows = self.extinction[(m + 1) * nu * nv..].par_chunks_exact_mut(nu).take(nv);
+        rows.with_min_len(16).enumerate().for_each(|(v, row)| {
             level.run(FillRow { course, lattice, bricks, medium, parts: &parts, layer, plane, v, row });
         });
-        true
     }
 
     /// Extinction in a row, at the plane before the first for `m = 0`, and from there on.

@@ -38,8 +38,10 @@ struct UnderWay {
 /// What comes next of a slab. Each takes milliseconds, so that a stop is not waited for.
 #[derive(Clone, Copy, Debug)]
 enum Stage {
-    /// Its matter.
-    Fill,
+    /// The slab itself.
+    Advance,
+    /// Its matter at the plane of this number.
+    Fill(usize),
     /// The fan of this number passes it.
     Pass(usize),
     /// Texels from the brick of this number on.
@@ -130,17 +132,19 @@ impl Sweeps {
             let UnderWay { fans, slab, stage } = under_way.get_or_insert_with(|| UnderWay {
                 fans: points.iter().map(|&point| Fan::new(point, aims[point], *course)).collect(),
                 slab: Slab::new(course),
-                stage: Stage::Fill,
+                stage: Stage::Advance,
             });
             loop {
                 if stop.reached_now() {
                     return false;
                 }
                 *stage = match *stage {
-                    Stage::Fill if slab.advance(course, texels.lattice, texels.bricks, medium, level) => {
-                        Stage::Pass(0)
+                    Stage::Advance if slab.advance(course, texels.bricks) => Stage::Fill(0),
+                    Stage::Advance => break,
+                    Stage::Fill(m) => {
+                        slab.fill(m, course, texels.lattice, texels.bricks, medium, level);
+                        if m + 1 < slab.count { Stage::Fill(m + 1) } else { Stage::Pass(0) }
                     }
-                    Stage::Fill => break,
                     Stage::Pass(fan) => {
                         fans[fan].pass(slab, around, level);
                         if fan + 1 < fans.len() { Stage::Pass(fan + 1) } else { Stage::Write(0) }
@@ -148,7 +152,7 @@ impl Sweeps {
                     Stage::Write(first) => {
                         write(course, fans, slab, texels, first, level);
                         let next = first + WRITTEN_TOGETHER;
-                        if next < texels.bricks.kept().len() { Stage::Write(next) } else { Stage::Fill }
+                        if next < texels.bricks.kept().len() { Stage::Write(next) } else { Stage::Advance }
                     }
                 };
             }
