@@ -124,7 +124,7 @@ fn a_peak_between_two_samples_is_lit_as_by_path() {
     for (peak, shadows, within) in [
         (seen_from_aslant(10.0, -500.0, 6.0), "exact", 0.02),
         (seen_from_aslant(200.0, -500.0, 6.0), "exact", 0.02),
-        // Dense: steps are lit at two sites.
+        // Dense: steps are lit at several sites.
         (seen_from_aslant(40.0, -500.0, 120.0), "exact", 0.013),
         (seen_from_aslant(10.0, -980.0, 6.0), "exact", 0.02),
         // Thin enough that shadows are cached, in texels wider than the shell: light that grazes it meets less of it.
@@ -144,6 +144,25 @@ fn a_peak_between_two_samples_is_lit_as_by_path() {
                 off.abs() < within,
                 "{off} for {width} HU about {middle}, density {density}, {shadows}, {way:?}"
             );
+        }
+    }
+}
+
+/// Most of the light of a sky comes aslant, and is spent within a thick step before the view is.
+#[test]
+fn thick_steps_are_lit_by_the_sky_as_by_path() {
+    let folder = Folder::new();
+    folder.put("a.nrrd", ball(1.0, 0.0).nrrd("short"));
+    let (truth, marches) = truth_and_marches();
+    for (width, density) in [(200.0, 10.0), (40.0, 10.0), (200.0, 4.0)] {
+        let mut look = lit(Peak { width, density, view: VIEWS[1], ..Peak::HALFWAY }.look(1.0, 0.0));
+        look["lights"] = json!([{ "type": "environment", "radiance": 1, "visible": false }]);
+        look["render"]["raymarch"] = json!({ "shadows": "exact", "light_samples": 64 });
+        let [expected, ..] = seen(&picture(&folder, "a.nrrd", &with_samples(&look, truth), truth));
+        for &way in marches.iter().filter(|way| way.method == "raymarch") {
+            let [found, ..] = seen(&picture(&folder, "a.nrrd", &with_samples(&look, way), way));
+            let off = found / expected - 1.0;
+            assert!(off.abs() < 0.02, "{off} for {width} HU, density {density}, {way:?}");
         }
     }
 }

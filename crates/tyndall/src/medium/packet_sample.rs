@@ -45,20 +45,25 @@ impl<S: Lanes> SeenLanes<S> {
 
 impl<S: Lanes> PacketSample<S> {
     /// How many sites at most a step is seen at.
-    pub const SITES: usize = 2;
+    pub const SITES: usize = 4;
 
-    /// Where some lanes' steps are seen, at the first or second of their sites; `None` if none of them has that site. Steps
-    /// have two where they are thick and hold a peak, which light may reach from either side: sites stand for equal shares of what is
+    /// Where some lanes' steps are seen, at one of their sites; `None` if none of them has that site. Thick steps
+    /// have two or four, since light that comes aslant or from behind is spent otherwise than the view: sites stand for equal shares of what is
     /// visible of a step. In constant thin matter the only site is the step's middle.
     #[inline(always)]
     pub fn seen(&self, simd: S, medium: &Medium, lanes: S::mask32s, site: usize) -> Option<SeenLanes<S>> {
-        let two = self.ends.is_narrow() & self.thickness.simd_gt(S::f32s::splat(simd, THICK));
-        let lanes = if site == 0 { lanes } else { lanes & two };
+        let two = self.thickness.simd_gt(S::f32s::splat(simd, THICK[0]));
+        let four = self.thickness.simd_gt(S::f32s::splat(simd, THICK[1]));
+        let lanes = match site {
+            0 => lanes,
+            1 => lanes & two,
+            _ => lanes & four,
+        };
         if !lanes.any_true() {
             return None;
         }
         let one = S::f32s::splat(simd, 1.0);
-        let weight = two.select(one * 0.5, one);
+        let weight = four.select(one * 0.25, two.select(one * 0.5, one));
         let within = (self.within + site as f32) * weight;
         Some(self.seen_within(simd, medium, lanes, within, weight))
     }
@@ -113,5 +118,5 @@ impl<S: Lanes> PacketSample<S> {
 
 /// Optical thickness up to which a step hides nothing of itself.
 const THIN: f32 = 1e-3;
-/// Optical thickness above which the front and the back of a step are lit differently.
-const THICK: f32 = 0.5;
+/// Optical thicknesses above which a step is seen at two sites, and at four, since its front and its back are lit differently.
+const THICK: [f32; 2] = [0.5, 1.5];

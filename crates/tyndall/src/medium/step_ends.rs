@@ -13,9 +13,6 @@ const HALVINGS: usize = 6;
 /// times the smallest. Where opacity changes less, it matters little how the values get from one end to the other.
 pub(super) const STEADY: f32 = 2.0;
 
-/// A step holds a peak if its mean opacity is more than this many times that at both ends.
-const PEAK: f32 = 2.0;
-
 /// Planes through voxel centres that a step crosses, at which the trilinear field bends: the first along each axis. Steps are shorter than
 /// a voxel unless voxels are flat or `step` is large; later bends are then missed.
 const BENDS: usize = 3;
@@ -158,13 +155,6 @@ impl<S: Lanes> StepEnds<S> {
             most = self.bent.select(most.max(x).max(y).max(z), most);
         }
         [least, most]
-    }
-
-    /// Lanes that hold a peak, which light may reach from either side.
-    #[inline(always)]
-    pub fn is_narrow(&self) -> S::mask32s {
-        let [from, to] = self.opacities;
-        self.bent & self.mean.simd_gt(from.opacity.max(to.opacity) * PEAK)
     }
 
     /// Where in their steps some lanes have met a share of the matter.
