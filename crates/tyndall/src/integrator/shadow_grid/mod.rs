@@ -20,7 +20,7 @@ mod texels;
 use bricks::{Bricks, EDGE, OpaqueCells};
 use lattice::Lattice;
 
-use super::Limits;
+use super::{Limits, drop_elsewhere};
 use crate::math::{Mat3, Vec3, cast};
 use crate::medium::{HalfSpace, Medium};
 use crate::simd::{Lanes, Level, MOST_LANES};
@@ -209,7 +209,13 @@ impl ShadowGrid {
     pub fn complete(&mut self, medium: &Medium, level: Level, limits: &Limits) -> bool {
         let Layout { lattice, bricks } = &self.layout;
         if matches!(self.state, State::Empty) {
-            self.texels.resize(bricks.texels() * self.stride, 0);
+            let bytes = bricks.texels() * self.stride;
+            if self.texels.len() < bytes {
+                // Growing would copy texels that are all written anew, and clear the rest; new memory is clear already.
+                drop_elsewhere(std::mem::take(&mut self.texels));
+                self.texels = vec![0; bytes];
+            }
+            self.texels.truncate(bytes);
             self.state = State::Sweeping(Sweeps::new(&self.aims, lattice.texels()));
         }
         if let State::Sweeping(sweeps) = &mut self.state {
