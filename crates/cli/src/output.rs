@@ -40,9 +40,7 @@ fn check_replaceable(path: &Path, input: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     let name = tyndall::message::path_name(path);
-    let is_input =
-        path.canonicalize().is_ok_and(|path| input.canonicalize().is_ok_and(|input| path == input));
-    let found = if is_input {
+    let found = if is_same_file(path, input) {
         "is the input"
     } else if matches!(read_metadata(path), Ok(Some(_))) {
         return Ok(());
@@ -207,6 +205,24 @@ pub fn statistics(path: &Path, value: &serde_json::Value) -> Result<(), Failure>
         return say(&text);
     }
     tyndall_formats::atomic::replace(path, text.as_bytes()).map_err(|e| Failure::input(unwritable(path, &e)))
+}
+
+/// Refuses to replace the input by its look.
+pub fn check_look(look: Option<&Path>, input: &Path) -> Result<(), Failure> {
+    match look {
+        Some(path) if is_same_file(path, input) => {
+            let name = tyndall::message::path_name(path);
+            Err(Failure::usage(format!(
+                "--save-look {name}: is the input, of which a look is only a part; name another file"
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether two paths lead to the same file.
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
 }
 
 /// Writes a look, as JSON if the extension says so, else as TOML.

@@ -46,6 +46,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let mut input = Input::open(&options.input).map_err(Failure::input)?;
     let paths = output::paths(&options.outputs, &options.input)?;
     output::check(&paths, options.run.stats.as_deref(), options.save_look.as_deref())?;
+    output::check_look(options.save_look.as_deref(), &options.input)?;
     if options.part.is_some() {
         output::check_exr(&paths, "--part")?;
     }

@@ -6,6 +6,7 @@ use crate::machine::{pool, vector_instructions};
 use crate::progress::Display;
 use crate::{Failure, output};
 use serde_json::json;
+use tyndall::message::path_name;
 use tyndall::transfer::Preset;
 use tyndall_live::{Budget, Input, LOOKS, LiveSession, Look, Options};
 
@@ -23,7 +24,20 @@ const INK: [u8; 3] = [225; 3];
 pub fn run(options: &SheetOptions) -> Result<(), Failure> {
     let threads = pool(options.threads)?;
     let level = vector_instructions()?;
+    if !options.output.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
+        let name = path_name(&options.output);
+        return Err(Failure::usage(format!("-o {name}: a sheet is a PNG file; expected a name with .png")));
+    }
     output::check(std::slice::from_ref(&options.output), None, None)?;
+    let [width, height] = options.size;
+    let too_large = || {
+        Failure::usage(format!(
+            "--size {width}x{height}: the page would be larger than {MOST_EDGE} pixels; expected smaller pictures"
+        ))
+    };
+    if width.max(height) > MOST_EDGE {
+        return Err(too_large());
+    }
     let on = Options { threads: threads.clone(), level, edits: false };
     let input = Input::open(&options.input).map_err(Failure::input)?;
     let loaded = input.clone().load(&on).map_err(Failure::input)?;
@@ -31,15 +45,12 @@ pub fn run(options: &SheetOptions) -> Result<(), Failure> {
     drop(loaded);
     let looks: Vec<&Look> = LOOKS.iter().filter(|look| look.suits(preset)).collect();
 
-    let [width, height] = options.size;
     let columns = (1..).find(|n| n * n >= looks.len()).unwrap_or(1).max(1);
     let rows = looks.len().div_ceil(columns);
     let [cell_width, cell_height] = [width + GAP, height + CAPTION + GAP];
     let most = u32::try_from(columns.max(rows)).ok().and_then(|n| n.checked_mul(cell_width.max(cell_height)));
     if most.is_none_or(|most| most > MOST_EDGE) {
-        return Err(Failure::usage(format!(
-            "--size {width}x{height}: the page would be larger than {MOST_EDGE} pixels; expected smaller pictures"
-        )));
+        return Err(too_large());
     }
     let place = |i: usize| {
         let [column, row] = [i % columns, i / columns].map(|n| u32::try_from(n).unwrap_or(u32::MAX));

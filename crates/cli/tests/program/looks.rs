@@ -168,8 +168,36 @@ fn maps_of_a_look_are_beside_it() {
         &["render", "../a.toml", "--look", "../looks/x.toml", "-o", "a.exr", "--save-look", "y.json"],
     );
     run(&folder, &["render", "../a.toml", "--look", "y.json", "-o", "b.exr"]);
-    let [a, b] = ["a.exr", "b.exr"].map(|name| written(&folder, name).len());
-    assert_eq!(a, b);
+    assert_eq!(written(&folder, "a.exr"), written(&folder, "b.exr"));
+}
+
+#[test]
+fn a_look_does_not_replace_the_scene_that_it_is_saved_from() {
+    let folder = Folder::new();
+    let scene = "volume.procedural = { kind = 'cloud', size = [8, 8, 8] }\nfilm.size = [8, 8]";
+    folder.put("a.toml", scene);
+    let Ended { status, stderr, .. } =
+        folder.run(&["render", "../a.toml", "--save-look", "../out/../a.toml"]);
+    assert_eq!(status, Some(2), "{stderr}");
+    assert!(stderr.contains("a.toml") && stderr.contains("is the input"), "{stderr}");
+    assert_eq!(std::fs::read_to_string(folder.at("a.toml")).expect("a file"), scene);
+}
+
+#[test]
+fn a_sheet_that_cannot_be_is_refused() {
+    let folder = Folder::new();
+    folder.put("a.toml", "volume.procedural = { kind = 'cloud', size = [8, 8, 8] }");
+    for size in ["4294967295x1", "1x4294967295", "4294967290x4294967290", "8000x10"] {
+        let Ended { status, stderr, .. } =
+            folder.run(&["sheet", "../a.toml", "-o", "s.png", "--size", size, "--samples", "1"]);
+        assert_eq!(status, Some(2), "{size}: {stderr}");
+        assert!(stderr.contains(size), "{stderr}");
+    }
+    for name in ["s.jpg", "s", "-"] {
+        let Ended { status, stderr, .. } = folder.run(&["sheet", "../a.toml", "-o", name]);
+        assert_eq!(status, Some(2), "{stderr}");
+        assert!(stderr.contains(".png"), "{stderr}");
+    }
 }
 
 #[test]
