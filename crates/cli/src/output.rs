@@ -7,7 +7,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use tyndall::film::{Film, Image};
 use tyndall_formats::image::{Metadata, Picture, encode_png, keeps_transparency, read_metadata, write};
-use tyndall_live::document::{Background, Document, Light};
+use tyndall_live::document::{Background, Document, Exposure, Light};
 use tyndall_live::look_text;
 
 /// The name of standard output.
@@ -113,7 +113,15 @@ pub fn pictures(
     source_folder: &Path,
     samples: Option<&StateInfo>,
 ) -> Result<(), Failure> {
-    let Image { size, rgba, variance, depth } = film.image();
+    let image = film.image();
+    let stops = document.film.stops(&image);
+    let tone = document.film.shown_at(stops);
+    let mut document = document.clone();
+    // A picture that can go on, and a part, keep what the whole is to have.
+    if samples.is_none() {
+        document.film.exposure = Exposure::Stops(stops);
+    }
+    let Image { size, rgba, variance, depth } = image;
     let mut picture = Picture {
         width: size[0],
         height: size[1],
@@ -123,11 +131,10 @@ pub fn pictures(
         transparent: document.film.background == Background::Transparent,
         state: Vec::new(),
     };
-    let tone = document.film.shown();
     for path in paths {
         let to_stdout = path.as_os_str() == STDOUT;
         let folder = if to_stdout { Path::new("") } else { path.parent().unwrap_or(Path::new("")) };
-        let mut metadata = metadata(film, document, source_folder, folder, samples);
+        let mut metadata = metadata(film, &document, source_folder, folder, samples);
         let samples = samples.filter(|_| is_exr(path));
         picture.state = samples.map(|_| film.state().layers).unwrap_or_default();
         if let Some(samples) = samples {

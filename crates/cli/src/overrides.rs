@@ -10,7 +10,7 @@ use tyndall_live::{Input, LOOKS, Look, read_look};
 /// Applies the options to the document: the look, `--set` in the given order, then the others.
 pub fn lay_over(input: &mut Input, options: &SceneOptions, samples: Option<u32>) -> Result<(), Failure> {
     if let Some(look) = &options.look {
-        input.patch(&look_named(look)?).map_err(Failure::input)?;
+        input.give_look(&look_named(look)?).map_err(Failure::input)?;
     }
     for assignment in &options.set {
         input.set(assignment).map_err(|e| Failure::usage(format!("--set {}: {e}", excerpt(assignment))))?;

@@ -82,7 +82,7 @@ fn picture(
 ) -> Result<Vec<[u8; 3]>, Failure> {
     let mut input = input.clone();
     let within = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", look.name));
-    input.patch(&look.patch()).map_err(|e| within(&e))?;
+    input.give_look(&look.patch()).map_err(|e| within(&e))?;
     input.patch(&json!({ "film": { "size": options.size } })).map_err(|e| within(&e))?;
     if let Some(samples) = options.samples {
         input.patch(&json!({ "render": { "samples": samples } })).map_err(|e| within(&e))?;
@@ -90,6 +90,7 @@ fn picture(
     let mut live = LiveSession::start(input, on.clone()).map_err(Failure::input)?;
     live.refine(&Budget::samples(live.document().render.samples()));
     let mut codes = vec![[0; 3]; options.size.map(|n| n as usize).iter().product()];
-    live.document().film.shown().encode(on.level, &live.image().rgba, &mut codes);
+    let image = live.image();
+    live.document().film.shown(&image).encode(on.level, &image.rgba, &mut codes);
     Ok(codes)
 }

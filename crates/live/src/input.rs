@@ -4,7 +4,9 @@ use crate::assets::{self, AssetError, Assets, Source};
 use crate::chosen;
 use crate::document::{self, Document, DocumentError};
 use crate::error::LiveError;
+use crate::look::Look;
 use crate::options::Options;
+use crate::text_file::read_text;
 use serde_json::{Value, json};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -50,12 +52,6 @@ pub struct LoadedScene {
 /// diagonal.
 const BARE_THICKNESS: f32 = 200.0;
 
-/// The largest text document that is read, in bytes.
-const LARGEST_DOCUMENT: u64 = 256 << 20;
-
-/// Bytes of memory that a byte of text may take: a million lights took 33 times the size of their text.
-const MEMORY_PER_BYTE: u64 = 40;
-
 /// Extensions of pictures.
 const PICTURES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "exr"];
 
@@ -63,7 +59,8 @@ const PICTURES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "exr"];
 const GRADIENT_RANGE: &str = "/medium/gradient_range";
 
 impl Input {
-    /// Opens a file as what its extension says: a scene, a picture with a scene in its metadata, or else a volume.
+    /// Opens a file as what its extension says: a scene, a picture with a scene in its metadata, or else a volume, which gets the look
+    /// [`Look::automatic`].
     ///
     /// # Errors
     /// [`LiveError::File`], [`LiveError::Picture`] or [`LiveError::Document`], which name the file.
@@ -82,6 +79,9 @@ impl Input {
         let mut input =
             Self { value, folder, bare, lacks_gradient_range, name: path_name(path), notes: Vec::new() };
         input.notes = in_file(path, document::move_old_keys(&mut input.value))?;
+        if bare {
+            input.value = document::apply(&input.value, &Look::automatic().patch());
+        }
         Ok(input)
     }
 
@@ -90,6 +90,17 @@ impl Input {
     pub fn of_document(value: Value, folder: &Path) -> Self {
         let (folder, name) = (folder.to_owned(), "scene".to_owned());
         Self { value, folder, bare: false, lacks_gradient_range: false, name, notes: Vec::new() }
+    }
+
+    /// Gives the document a look, before any other patch; that of a bare volume, which was chosen automatically, is dropped.
+    ///
+    /// # Errors
+    /// As [`Self::patch`].
+    pub fn give_look(&mut self, look: &Value) -> Result<(), DocumentError> {
+        if self.bare {
+            self.value = json!({ "volume": self.value["volume"] });
+        }
+        self.patch(look)
     }
 
     /// Applies a merge patch to the document.
@@ -187,33 +198,4 @@ fn in_file<T>(path: &Path, result: Result<T, DocumentError>) -> Result<T, LiveEr
 
 fn file(path: &Path, problem: impl Display) -> LiveError {
     LiveError::File { at: path_name(path), problem: problem.to_string() }
-}
-
-/// The text of a file that should be `what`, such as "a scene document".
-///
-/// # Errors
-/// [`LiveError::File`] if it cannot be read, is not UTF-8, or is too large.
-pub fn read_text(path: &Path, what: &str) -> Result<String, LiveError> {
-    let unreadable = |e: std::io::Error| file(path, format!("cannot be read: {e}; check the path"));
-    let about = std::fs::metadata(path).map_err(unreadable)?;
-    if !about.is_file() {
-        return Err(file(path, format!("not a file; expected {what}")));
-    }
-    if about.len() > LARGEST_DOCUMENT {
-        return Err(file(path, format!("{} bytes; {what} has at most {LARGEST_DOCUMENT}", about.len())));
-    }
-    let needed = about.len().saturating_mul(MEMORY_PER_BYTE);
-    if let Some(available) = tyndall_formats::memory::available().filter(|&available| needed > available) {
-        let problem = format!(
-            "{what} of {} MiB takes up to {} MiB of memory, but {} MiB are free; expected a smaller one",
-            about.len() >> 20,
-            needed >> 20,
-            available >> 20
-        );
-        return Err(file(path, problem));
-    }
-    let bytes = std::fs::read(path).map_err(unreadable)?;
-    String::from_utf8(bytes).map_err(|e| {
-        file(path, format!("byte {} is not UTF-8; expected {what} in UTF-8", e.utf8_error().valid_up_to()))
-    })
 }

@@ -47,15 +47,17 @@ mod look;
 mod options;
 mod scene_error;
 mod session;
+mod text_file;
 mod undo;
 
 pub use assets::{Assets, Source};
 pub use build::Built;
 pub use error::LiveError;
 pub use identity::{KeyDifference, SceneIdentity, first_difference};
-pub use input::{Input, LoadedScene, read_text};
+pub use input::{Input, LoadedScene};
 pub use look::{LOOKS, Look, look_of, look_text, read_look};
 pub use options::Options;
 pub use scene_error::SceneError;
 pub use session::{EditReport, EditSource, LiveSession};
+pub use text_file::read_text;
 pub use tyndall::session::{Budget, Progress};

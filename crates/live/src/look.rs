@@ -2,7 +2,7 @@
 
 use crate::document::{self, Document};
 use crate::error::LiveError;
-use crate::input::read_text;
+use crate::text_file::read_text;
 use serde_json::{Value, json};
 use std::path::Path;
 use tyndall::message::path_name;
@@ -41,11 +41,13 @@ looks! {
     "glass" for ["ct-bone"] => "CT: bone within skin of blue glass",
     "angio" for ["ct-bone"] => "CT with contrast agent: wet red vessels, with bone",
     "anatomy" for ["ct-bone"] => "CT: wet muscle and organs, with bone",
-    "airways" for ["ct-bone"] => "CT: lungs as a blue mist about the airways",
+    "lungs" for ["ct-bone"] => "CT: lungs under a veil of skin",
     "phantom" for ["mri"] => "MRI: translucent tissue on black",
     "stone" for ["solid", "cloud"] => "rock and other solids: raking warm light",
     "smoke" for ["cloud"] => "simulations: a cloud between warm and cool light",
+    "veils" for ["cloud", "solid"] => "simulations, any data: coloured veils at rising values, on black",
     "dye" for ["cloud"] => "microscopy: fluorescence on black",
+    "stain" for ["cloud"] => "microscopy: a purple stain on white",
 }
 
 /// Keys that say what is seen and from where, and so are not part of a look.
@@ -59,6 +61,12 @@ impl Look {
     #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
         LOOKS.iter().find(|look| look.name == name)
+    }
+
+    /// The look of a volume for which none is asked for.
+    #[must_use]
+    pub fn automatic() -> &'static Self {
+        &LOOKS[0]
     }
 
     /// Whether it is made for data that are shown by this preset if none is asked for.

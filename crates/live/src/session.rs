@@ -3,7 +3,7 @@
 use crate::admission;
 use crate::assets::{self, Assets, Source};
 use crate::build::Built;
-use crate::document::{self, Document};
+use crate::document::{self, Document, Exposure};
 use crate::error::LiveError;
 use crate::identity::SceneIdentity;
 use crate::input::{Input, LoadedScene};
@@ -233,7 +233,12 @@ impl LiveSession {
 
     /// Brings a viewer's picture up to date, toned as the document says; see [`Viewer::look`].
     pub fn look(&self, viewer: &mut Viewer, picture: &mut Vec<[u8; 3]>) {
-        self.session.look(viewer, self.document().film.shown(), picture);
+        let film = &self.document().film;
+        let tone = match film.exposure {
+            Exposure::Auto => film.shown(&self.image()),
+            Exposure::Stops(stops) => film.shown_at(stops),
+        };
+        self.session.look(viewer, tone, picture);
     }
 
     /// Continues with the samples of another film of the same scene, see [`Session::go_on_with`].

@@ -99,7 +99,8 @@ fn pictures_of_earlier_versions_keep_the_robust_range() {
     assert_eq!(scene_of(&folder, "again.png")["medium"]["gradient_range"], 1900.0);
 }
 
-fn scene_of(folder: &Folder, name: &str) -> Value {
+/// The scene in the metadata of a picture that the program wrote.
+pub fn scene_of(folder: &Folder, name: &str) -> Value {
     let metadata = read_metadata(&folder.at("out").join(name)).expect(name).expect(name);
     parse(metadata.get(Metadata::SCENE).expect(name).as_bytes())
 }

@@ -7,7 +7,7 @@ use tyndall::transfer::Preset;
 use tyndall_live::{Budget, Input, LOOKS, LiveSession, Look, Options, read_look};
 
 /// A ball in air: skin, fat, muscle, contrast agent and bone from outside inwards, as CT in HU, to which `change` is then done.
-fn ball(change: fn(f64) -> f64) -> Data {
+pub fn ball(change: fn(f64) -> f64) -> Data {
     Data::new(24, move |[x, y, z]| {
         let radius = (x * x + y * y + z * z).sqrt();
         let ripple = 8.0 * (40.0 * (x + 0.3 * y)).sin() * (30.0 * z).cos();
@@ -44,7 +44,7 @@ fn files() -> [(&'static str, Data, &'static str); 5] {
     ]
 }
 
-fn options() -> Options {
+pub fn options() -> Options {
     Options { edits: false, ..Options::new().expect("threads") }
 }
 
@@ -60,7 +60,7 @@ fn every_look_shows_the_data_that_it_is_made_for() {
             let mut input = Input::open(&folder.at(&name)).expect("a volume");
             let loaded = input.clone().load(&options()).expect("a volume");
             assert_eq!(Preset::for_volume(&loaded.assets.volume).name, preset);
-            input.patch(&look.patch()).expect("a patch");
+            input.give_look(&look.patch()).expect("a patch");
             input
                 .patch(&json!({ "film": { "size": [32, 32] }, "render": { "samples": 16 } }))
                 .expect("a patch");
@@ -71,7 +71,7 @@ fn every_look_shows_the_data_that_it_is_made_for() {
             let pixels = image.rgba.len() as f64;
             assert!(matter > 0.02 * pixels, "{}: {matter} of {pixels} pixels", look.name);
             // Without the background, which is seen but is not light.
-            let back = live.document().film.shown().backdrop.map_or([0.0; 3], |b| b.color.to_array());
+            let back = live.document().film.shown(&image).backdrop.map_or([0.0; 3], |b| b.color.to_array());
             let light: f64 = mean(&image)
                 .iter()
                 .zip(back)

@@ -1,6 +1,7 @@
 //! The program from its command line. These tests are one program, which is linked once; those that watch the clock, or what a run may
 //! take of the machine, are programs of their own, beside which no other test runs.
 
+mod automatic_looks;
 mod backgrounds;
 mod bad_input;
 mod broken_files;

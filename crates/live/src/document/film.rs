@@ -2,10 +2,10 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tyndall::film::Backdrop;
 use tyndall::film::tone::ToneCurve;
+use tyndall::film::{Backdrop, Image};
 
-use super::shape::{Color, Exposure, Size};
+use super::shape::{Color, Size, Stops};
 
 /// Size of the picture, and how radiance becomes an 8-bit image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -15,9 +15,8 @@ pub struct Film {
     #[schemars(with = "Size<2>")]
     pub size: [u32; 2],
 
-    /// Brightness of 8-bit outputs, in stops: +1 doubles it.
-    #[schemars(with = "Exposure")]
-    pub exposure: f32,
+    /// Brightness of 8-bit outputs, in stops: +1 doubles it; `auto` sets it from the picture.
+    pub exposure: Exposure,
 
     /// Tone curve of 8-bit outputs.
     pub tone: Tone,
@@ -28,19 +27,60 @@ pub struct Film {
 
 impl Default for Film {
     fn default() -> Self {
-        Self { size: [512; 2], exposure: 0.0, tone: Tone::default(), background: Background::default() }
+        Self {
+            size: [512; 2],
+            exposure: Exposure::default(),
+            tone: Tone::default(),
+            background: Background::default(),
+        }
     }
 }
 
 impl Film {
-    /// How it is shown in 8 bits.
+    /// How a picture is shown in 8 bits.
     #[must_use]
-    pub fn shown(&self) -> tyndall::film::Tone {
-        let backdrop = match self.background {
+    pub fn shown(&self, picture: &Image) -> tyndall::film::Tone {
+        self.shown_at(self.stops(picture))
+    }
+
+    /// How a picture is shown in 8 bits with an exposure in stops.
+    #[must_use]
+    pub fn shown_at(&self, stops: f32) -> tyndall::film::Tone {
+        tyndall::film::Tone { curve: self.tone.curve(), stops, backdrop: self.backdrop() }
+    }
+
+    /// Its exposure, in stops, as given or else measured in the picture.
+    #[must_use]
+    pub fn stops(&self, picture: &Image) -> f32 {
+        match self.exposure {
+            Exposure::Auto => picture.exposure(self.backdrop()),
+            Exposure::Stops(stops) => stops,
+        }
+    }
+
+    fn backdrop(&self) -> Option<Backdrop> {
+        match self.background {
             Background::Color(color) => Some(Backdrop { color: color.into(), in_radiance: true }),
             Background::Environment | Background::Transparent => None,
-        };
-        tyndall::film::Tone { curve: self.tone.curve(), stops: self.exposure, backdrop }
+        }
+    }
+}
+
+/// Brightness of 8-bit outputs: a number of stops, or one that suits the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Exposure {
+    /// What brings the bright parts of the matter to a linear radiance of 0.6, or of 0.3 before white, see [`Image::exposure`]. Metadata state
+    /// the number.
+    Auto,
+    /// Stops: +1 doubles the brightness.
+    #[serde(untagged)]
+    Stops(#[schemars(with = "Stops")] f32),
+}
+
+impl Default for Exposure {
+    fn default() -> Self {
+        Self::Stops(0.0)
     }
 }
 

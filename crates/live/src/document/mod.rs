@@ -46,7 +46,7 @@ mod volume;
 pub use camera::{AutoView, Camera};
 pub use clip::Clip;
 pub use error::{DocumentError, Problem, Problems};
-pub use film::{Background, Film, Tone};
+pub use film::{Background, Exposure, Film, Tone};
 pub use light::{Axes, Light};
 pub use medium::{Brdf, Medium, Phase};
 pub use moved::move_old_keys;

@@ -49,7 +49,7 @@ shapes! {
     /// An angle above the horizon, in degrees.
     Elevation = { "type": "number", "format": "float", "minimum": -90, "maximum": 90 };
     /// Stops, limited so that powers of two stay in the range of single precision.
-    Exposure = { "type": "number", "format": "float", "minimum": -100, "maximum": 100 };
+    Stops = { "type": "number", "format": "float", "minimum": -100, "maximum": 100 };
     /// A number of scattering events.
     ScatteringOrder = { "type": "integer", "format": "uint32", "minimum": 0, "maximum": 1_000_000 };
     /// A number of samples per pixel, up to 2^31.

@@ -6,6 +6,7 @@
 mod columns;
 mod encode;
 mod estimate;
+mod exposure;
 mod look;
 mod noise;
 mod state;

@@ -1,13 +1,11 @@
 //! Presets that find their thresholds in the histogram.
 
-use super::{Profile, labels, matter};
+use super::{Profile, glossy, labels, matter};
 use crate::math::{Rgb, cast};
 use crate::transfer::Point;
 use crate::volume::Volume;
 
-const TISSUE: [f32; 3] = [0.90, 0.70, 0.60];
-const BRIGHT: [f32; 3] = [0.95, 0.88, 0.80];
-const STONE: [f32; 3] = [0.90, 0.85, 0.76];
+const STONE: [f32; 3] = [0.86, 0.74, 0.58];
 const WHITE: [f32; 3] = [0.97, 0.97, 0.97];
 
 /// The threshold between two classes of values by Otsu's criterion \[Otsu79\], as a share of the range:
@@ -71,23 +69,30 @@ fn ascending(mut points: Vec<Point>) -> Vec<Point> {
     points
 }
 
+/// Values of magnetic resonance have no units: the threshold `t` between air and tissue takes their place, and what is left above it.
 pub(super) fn mri(profile: &Profile) -> Vec<Point> {
     let t = otsu(profile);
+    let above = |share: f64| profile.at(t + share * (1.0 - t));
     ascending(vec![
-        matter(profile.at(0.55 * t), 0.0, TISSUE, 0.4),
-        matter(profile.at(t), 0.35, TISSUE, 0.6),
-        matter(profile.at(t + 0.4 * (1.0 - t)), 0.7, TISSUE, 0.6),
-        matter(profile.at(1.0), 1.0, BRIGHT, 0.6),
+        glossy(profile.at(0.9 * t), 0.0, [0.66, 0.34, 0.25], 0.4, 0.3),
+        glossy(above(0.13), 0.3, [0.75, 0.40, 0.30], 0.6, 0.3),
+        glossy(above(0.32), 0.8, [0.88, 0.58, 0.46], 0.7, 0.3),
+        glossy(above(0.57), 1.0, [0.96, 0.86, 0.74], 0.7, 0.3),
+        glossy(profile.at(1.0), 1.0, [0.97, 0.93, 0.85], 0.7, 0.3),
     ])
 }
 
 pub(super) fn mri_glass(profile: &Profile) -> Vec<Point> {
+    const GLASS: [f32; 3] = [0.45, 0.66, 0.95];
     let t = otsu(profile);
+    let above = |share: f64| profile.at(t + share * (1.0 - t));
     ascending(vec![
-        matter(profile.at(0.5 * t), 0.0, TISSUE, 0.0),
-        matter(profile.at(0.9 * t), 0.01, TISSUE, 0.3),
-        matter(profile.at(t + 0.5 * (1.0 - t)), 0.03, TISSUE, 0.3),
-        matter(profile.at(1.0), 0.5, BRIGHT, 0.5),
+        glossy(profile.at(0.8 * t), 0.0, GLASS, 0.2, 0.2),
+        glossy(above(0.06), 0.02, GLASS, 0.8, 0.2),
+        glossy(above(0.16), 0.001, [0.60, 0.66, 0.90], 0.3, 0.2),
+        glossy(above(0.38), 0.004, [0.90, 0.50, 0.40], 0.3, 0.2),
+        glossy(above(0.48), 0.05, [0.95, 0.70, 0.52], 0.6, 0.25),
+        glossy(profile.at(1.0), 0.06, [0.98, 0.86, 0.70], 0.7, 0.25),
     ])
 }
 
@@ -115,6 +120,19 @@ fn floor(profile: &Profile) -> f64 {
 pub(super) fn cloud(profile: &Profile) -> Vec<Point> {
     let floor = profile.at(floor(profile));
     ascending(vec![matter(floor, 0.0, WHITE, 0.0), matter(profile.at(1.0), 1.0, WHITE, 0.0)])
+}
+
+/// A stain as under a bright-field microscope, which takes the more light the more there is of it.
+pub(super) fn stain(profile: &Profile) -> Vec<Point> {
+    let floor = floor(profile);
+    let at = |share: f64| profile.at(floor + (1.0 - floor) * share);
+    ascending(vec![
+        matter(at(0.0), 0.0, [0.86, 0.56, 0.70], 0.0),
+        matter(at(0.15), 0.02, [0.82, 0.44, 0.62], 0.0),
+        matter(at(0.4), 0.15, [0.55, 0.25, 0.55], 0.2),
+        matter(at(0.7), 0.5, [0.30, 0.14, 0.44], 0.3),
+        matter(at(1.0), 1.0, [0.18, 0.08, 0.32], 0.3),
+    ])
 }
 
 /// Glow of a dye whose concentration is the value, in matter that scatters little.

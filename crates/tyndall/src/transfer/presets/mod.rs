@@ -43,18 +43,23 @@ pub enum PresetError {
 }
 
 /// All presets.
-pub const PRESETS: [Preset; 13] = [
-    Preset { name: "ct-bone", about: "CT: bone alone, as a solid", points: Points::Fixed(ct::bone) },
+pub const PRESETS: [Preset; 15] = [
+    Preset {
+        name: "ct-bone",
+        about: "CT: bone, and vessels with contrast agent, as solids",
+        points: Points::Fixed(ct::bone),
+    },
+    Preset {
+        name: "ct-skin",
+        about: "CT: skin, with what lies below where it is cut",
+        points: Points::Fixed(ct::skin),
+    },
     Preset {
         name: "ct-skin-bone",
         about: "CT: bone under translucent skin",
         points: Points::Fixed(ct::skin_bone),
     },
-    Preset {
-        name: "ct-lung",
-        about: "CT: airways and lung tissue as a thin cloud",
-        points: Points::Fixed(ct::lung),
-    },
+    Preset { name: "ct-lung", about: "CT: lungs, under a veil of skin", points: Points::Fixed(ct::lung) },
     Preset {
         name: "ct-muscle",
         about: "CT: muscle and organs, fat removed, with bone",
@@ -67,12 +72,12 @@ pub const PRESETS: [Preset; 13] = [
     },
     Preset {
         name: "mri",
-        about: "MRI: soft tissue, darker below and brighter above",
+        about: "MRI: tissue as a solid, red where it is dark and pale where it is bright",
         points: Points::Adaptive(adaptive::mri),
     },
     Preset {
         name: "mri-glass",
-        about: "MRI: translucent, to see what lies inside",
+        about: "MRI: brain and bright tissue under skin of blue glass",
         points: Points::Adaptive(adaptive::mri_glass),
     },
     Preset {
@@ -89,6 +94,11 @@ pub const PRESETS: [Preset; 13] = [
         name: "fluorescence",
         about: "any data: glow that grows with the value, as of a dye under the microscope",
         points: Points::Adaptive(adaptive::fluorescence),
+    },
+    Preset {
+        name: "stain",
+        about: "any data: a purple stain, the darker the larger the value, for a white background",
+        points: Points::Adaptive(adaptive::stain),
     },
     Preset {
         name: "layers",
@@ -192,6 +202,15 @@ impl<'a> Profile<'a> {
 /// A point of matter that scatters in a colour.
 fn matter(value: f32, opacity: f32, albedo: [f32; 3], surface: f32) -> Point {
     Point { value, optics: Optics { opacity, albedo: Rgb::from(albedo), surface, ..Optics::default() } }
+}
+
+/// A point of tissue that scatters in a colour, with a surface that reflects as much as water's does, and sharply where roughness is low.
+fn glossy(value: f32, opacity: f32, albedo: [f32; 3], surface: f32, roughness: f32) -> Point {
+    /// A little above that of water, 0.02 at right angles, since the reflectance of a BRDF has no total reflection below the skin.
+    const SPECULAR: f32 = 0.05;
+    let mut point = matter(value, opacity, albedo, surface);
+    (point.optics.specular, point.optics.roughness) = (Rgb::splat(SPECULAR), roughness);
+    point
 }
 
 /// Fig. 4 of \[Jonsson12\]: white walls with one red and one green, thin bluish air.
