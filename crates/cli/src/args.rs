@@ -12,6 +12,9 @@ use tyndall::transfer::PRESETS;
 const MOST_SAMPLES: i64 = 1 << 31;
 const MOST_SCATTER: i64 = 1_000_000;
 
+/// More frames than a film of an hour.
+const MOST_FRAMES: i64 = 100_000;
+
 /// Starting more threads than this takes longer than most pictures.
 const MOST_THREADS: i64 = 1024;
 
@@ -110,6 +113,19 @@ pub struct RenderOptions {
     /// An OpenEXR file that is written can be resumed again.
     #[arg(long, value_name = "FILE", help_heading = "In several runs")]
     pub resume: Option<PathBuf>,
+
+    /// Render N frames of a full turn: the camera goes round the volume, about the world's up
+    ///
+    /// Each -o is a sequence, such as turn_{:04}.png, or a film: .apng, or by the system's ffmpeg .mp4, .mov, .mkv or .webm
+    /// [default: the input's name with .apng]. The options of when to stop hold for each frame.
+    #[arg(long, value_name = "N", help_heading = "Films", value_parser = value_parser!(u32).range(1..=MOST_FRAMES),
+          conflicts_with_all = ["part", "resume", "resumable"])]
+    pub turntable: Option<u32>,
+
+    /// Frames of a film per second
+    #[arg(long, value_name = "N", help_heading = "Films", default_value = "24", requires = "turntable",
+          value_parser = value_parser!(u16).range(1..=1000))]
+    pub fps: u16,
 
     /// What is rendered.
     #[command(flatten)]

@@ -18,6 +18,8 @@ mod replay;
 mod reserve;
 mod sheet;
 mod stats;
+mod turntable;
+mod video;
 
 use args::{Args, Command};
 use clap::{CommandFactory, Parser};

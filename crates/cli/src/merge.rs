@@ -11,7 +11,7 @@ use tyndall::message::{path_name, sentence};
 
 /// Merges the parts of a render, given in any order, to the picture of the whole.
 pub fn run(options: &MergeOptions) -> Result<(), Failure> {
-    output::check(&options.outputs, None, None)?;
+    output::check(&options.outputs, &[], None, None)?;
     if options.resumable {
         output::check_exr(&options.outputs, "--resumable")?;
     }

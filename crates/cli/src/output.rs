@@ -5,7 +5,7 @@ use crate::{Failure, say, stdout_failure};
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use tyndall::film::{Film, Image};
+use tyndall::film::{Film, Image, Tone};
 use tyndall_formats::image::{Metadata, Picture, encode_png, keeps_transparency, read_metadata, write};
 use tyndall_live::document::{Background, Document, Exposure, Light};
 use tyndall_live::look_text;
@@ -13,24 +13,24 @@ use tyndall_live::look_text;
 /// The name of standard output.
 const STDOUT: &str = "-";
 
-/// Where pictures go: the paths given, or the input's stem with .png in the current folder. Without being asked, nothing is replaced but
+/// Where pictures go: the paths given, or the input's stem with an extension in the current folder. Without being asked, nothing is replaced but
 /// an earlier picture.
-pub fn paths(asked: &[PathBuf], input: &Path) -> Result<Vec<PathBuf>, Failure> {
+pub fn paths(asked: &[PathBuf], input: &Path, extension: &str) -> Result<Vec<PathBuf>, Failure> {
     if !asked.is_empty() {
         return Ok(asked.to_vec());
     }
-    let path = default_path(input);
+    let path = default_path(input, extension);
     check_replaceable(&path, input)?;
     Ok(vec![path])
 }
 
-/// The input's stem with .png.
-fn default_path(input: &Path) -> PathBuf {
+/// The input's stem with an extension.
+fn default_path(input: &Path, extension: &str) -> PathBuf {
     let name = input.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     // "head.nii.gz" has two extensions.
     let name = name.strip_suffix(".gz").unwrap_or(&name);
     let stem = Path::new(name).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    PathBuf::from(format!("{stem}.png"))
+    PathBuf::from(format!("{stem}.{extension}"))
 }
 
 /// Refuses to replace the input, and whatever is no picture of Tyndall's.
@@ -53,9 +53,14 @@ fn check_replaceable(path: &Path, input: &Path) -> Result<(), Failure> {
 }
 
 /// Refuses, before any work, paths that cannot be written and paths that are named twice.
-pub fn check(pictures: &[PathBuf], statistics: Option<&Path>, look: Option<&Path>) -> Result<(), Failure> {
+pub fn check(
+    pictures: &[PathBuf],
+    films: &[PathBuf],
+    statistics: Option<&Path>,
+    look: Option<&Path>,
+) -> Result<(), Failure> {
     let mut taken = BTreeSet::new();
-    for path in pictures.iter().map(PathBuf::as_path).chain(statistics).chain(look) {
+    for path in pictures.iter().chain(films).map(PathBuf::as_path).chain(statistics).chain(look) {
         if !taken.insert(absolute(path)) {
             let path = tyndall::message::path_name(path);
             return Err(Failure::usage(format!(
@@ -65,6 +70,14 @@ pub fn check(pictures: &[PathBuf], statistics: Option<&Path>, look: Option<&Path
     }
     for path in pictures.iter().filter(|p| p.as_os_str() != STDOUT) {
         tyndall_formats::image::check_destination(path).map_err(Failure::usage)?;
+    }
+    for path in films {
+        tyndall_formats::atomic::check(path).map_err(|error| {
+            let path = tyndall::message::path_name(path);
+            Failure::usage(format!(
+                "-o {path}: the film cannot be written: {error}; name a file in a writable folder"
+            ))
+        })?;
     }
     if let Some(path) = statistics.filter(|p| p.as_os_str() != STDOUT) {
         tyndall_formats::atomic::check(path)
@@ -113,28 +126,13 @@ pub fn pictures(
     source_folder: &Path,
     samples: Option<&StateInfo>,
 ) -> Result<(), Failure> {
-    let image = film.image();
-    let stops = document.film.stops(&image);
-    let tone = document.film.shown_at(stops);
-    let mut document = document.clone();
+    let Shown { mut picture, tone, document: stated } = shown(film, document);
     // A picture that can go on, and a part, keep what the whole is to have.
-    if samples.is_none() {
-        document.film.exposure = Exposure::Stops(stops);
-    }
-    let Image { size, rgba, variance, depth } = image;
-    let mut picture = Picture {
-        width: size[0],
-        height: size[1],
-        rgba,
-        variance: Some(variance),
-        depth: Some(depth),
-        transparent: document.film.background == Background::Transparent,
-        state: Vec::new(),
-    };
+    let document = if samples.is_none() { &stated } else { document };
     for path in paths {
         let to_stdout = path.as_os_str() == STDOUT;
         let folder = if to_stdout { Path::new("") } else { path.parent().unwrap_or(Path::new("")) };
-        let mut metadata = metadata(film, &document, source_folder, folder, samples);
+        let mut metadata = metadata(film, document, source_folder, folder, samples);
         let samples = samples.filter(|_| is_exr(path));
         picture.state = samples.map(|_| film.state().layers).unwrap_or_default();
         if let Some(samples) = samples {
@@ -149,6 +147,40 @@ pub fn pictures(
         }
     }
     Ok(())
+}
+
+/// A picture as it is written.
+pub struct Shown {
+    /// The picture.
+    pub picture: Picture,
+    /// How it is shown in 8 bits.
+    pub tone: Tone,
+    /// The document with the exposure as a number.
+    pub document: Document,
+}
+
+/// The picture of a film.
+pub fn shown(film: &Film, document: &Document) -> Shown {
+    let image = film.image();
+    let stops = document.film.stops(&image);
+    let Image { size, rgba, variance, depth } = image;
+    let picture = Picture {
+        width: size[0],
+        height: size[1],
+        rgba,
+        variance: Some(variance),
+        depth: Some(depth),
+        transparent: document.film.background == Background::Transparent,
+        state: Vec::new(),
+    };
+    let mut stated = document.clone();
+    stated.film.exposure = Exposure::Stops(stops);
+    Shown { picture, tone: document.film.shown_at(stops), document: stated }
+}
+
+/// The metadata of a finished picture at a path.
+pub fn metadata_for(path: &Path, film: &Film, document: &Document, source_folder: &Path) -> Metadata {
+    metadata(film, document, source_folder, path.parent().unwrap_or(Path::new("")), None)
 }
 
 /// The scene with its paths relative to the picture's folder, so that both can move together.
@@ -254,7 +286,7 @@ mod tests {
 
     #[test]
     fn the_default_path_is_the_stem_in_the_current_folder() {
-        let path = |input: &str| default_path(Path::new(input)).to_string_lossy().into_owned();
+        let path = |input: &str| default_path(Path::new(input), "png").to_string_lossy().into_owned();
         assert_eq!(path("a/head.nrrd"), "head.png");
         assert_eq!(path("a/b.c/head.nii.gz"), "head.png");
         assert_eq!(path("scene.toml"), "scene.png");

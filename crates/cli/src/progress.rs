@@ -36,11 +36,19 @@ impl Display {
         if forced { Self::Lines { last: None } } else { Self::None }
     }
 
-    /// Shows the share done (0 to 1), the seconds left and the error so far.
-    pub fn show(&mut self, share: f64, samples: f64, left: Option<f64>, error: Option<f64>) {
+    /// Shows the share done (0 to 1), the seconds left and the error so far, after what else there is to say.
+    pub fn show(
+        &mut self,
+        share: f64,
+        samples: f64,
+        left: Option<f64>,
+        error: Option<f64>,
+        about: Option<&str>,
+    ) {
         let left = left.map_or_else(String::new, |s| format!(", {s:.0} s left"));
+        let about = about.map_or_else(String::new, |about| format!("{about}: "));
         let error = error.map_or_else(String::new, |e| format!(", error {e:.4}"));
-        self.say(share, format!("{samples:.1} samples{left}{error}"));
+        self.say(share, format!("{about}{samples:.1} samples{left}{error}"));
     }
 
     /// Shows the share done (0 to 1), and what is said of it.

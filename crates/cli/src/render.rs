@@ -6,6 +6,7 @@ use crate::parts::{Share, StateInfo, StoredRender};
 use crate::progress::Display;
 use crate::reserve::{Plan, Reserve};
 use crate::stats::{Stages, peak_memory};
+use crate::turntable::Turntable;
 use crate::{Failure, output, overrides};
 use serde_json::json;
 use std::io::Write;
@@ -44,8 +45,16 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     let threads = pool(options.run.threads)?;
     let level = vector_instructions()?;
     let mut input = Input::open(&options.input).map_err(Failure::input)?;
-    let paths = output::paths(&options.outputs, &options.input)?;
-    output::check(&paths, options.run.stats.as_deref(), options.save_look.as_deref())?;
+    let turntable = options
+        .turntable
+        .map(|frames| Turntable::new(frames, options.fps, &options.outputs, &options.input))
+        .transpose()?;
+    let paths = match &turntable {
+        Some(turntable) => turntable.pictures(),
+        None => output::paths(&options.outputs, &options.input, "png")?,
+    };
+    let films = turntable.as_ref().map(Turntable::films).unwrap_or_default();
+    output::check(&paths, &films, options.run.stats.as_deref(), options.save_look.as_deref())?;
     output::check_look(options.save_look.as_deref(), &options.input)?;
     if options.part.is_some() {
         output::check_exr(&paths, "--part")?;
@@ -102,7 +111,7 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     }
     // How many samples fit the time is not known.
     let expected = if limited { samples.min(usual_samples) } else { samples };
-    let reserve = Reserve::new(&Plan::of_session(&paths, &live, expected, keeps_samples))?;
+    let mut reserve = Some(Reserve::new(&Plan::of_session(&paths, &live, expected, keeps_samples))?);
     let stop = StopConditions {
         samples,
         time: options.time,
@@ -111,8 +120,24 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         usual_samples: usual_samples.max(2),
     };
     interrupt.picture_begins();
-    let display = Display::new(options.progress, options.run.quiet);
-    refine(&mut live, &stop, &interrupt.flag(), display);
+    let mut frames = Vec::new();
+    let mut refined = |live: &mut LiveSession, frame| {
+        let begun = Instant::now();
+        let about = turntable.as_ref().map(|turntable| turntable.about(frame));
+        let display = Display::new(options.progress, options.run.quiet);
+        refine(live, &stop, &interrupt.flag(), display, about.as_deref());
+        frames.push(json!({
+            "wall_s": begun.elapsed().as_secs_f64(),
+            "samples_per_pixel": live.film().mean_samples(),
+            "relative_error": live.session().relative_error(),
+        }));
+    };
+    if let Some(turntable) = &turntable {
+        drop(reserve.take());
+        turntable.render(&mut live, &interrupt, &mut refined)?;
+    } else {
+        refined(&mut live, 0);
+    }
     let rendered = stages.end("render");
     let interrupted = interrupt.is_requested();
     if interrupted && live.film().mean_samples() == 0.0 {
@@ -121,7 +146,9 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         }
         return Err(Failure::Interrupted);
     }
-    let late = |time: &Duration| live.film().samples() == 1 && rendered > 2.0 * time.as_secs_f64() + 0.5;
+    let late = |time: &Duration| {
+        turntable.is_none() && live.film().samples() == 1 && rendered > 2.0 * time.as_secs_f64() + 0.5
+    };
     if let Some(time) = stop.time.filter(late).filter(|_| !options.run.quiet) {
         let why = "the first sample of every pixel, without which a picture has holes,";
         let asked = time.as_secs_f64();
@@ -133,11 +160,13 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
     detail(&format!("{:.2} samples per pixel in {rendered:.2} s", live.film().mean_samples()));
 
     drop(reserve);
-    output::pictures(&paths, live.film(), live.document(), live.folder(), info.as_ref())?;
+    if turntable.is_none() {
+        output::pictures(&paths, live.film(), live.document(), live.folder(), info.as_ref())?;
+    }
     stages.end("write");
     if let Some(path) = &options.run.stats {
         let film = live.film();
-        let statistics = json!({
+        let mut statistics = json!({
             "integrator": live.scene().render.method.name(),
             "size": film.size(),
             "samples_per_pixel": film.mean_samples(),
@@ -151,6 +180,9 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
             "simd": level.name(),
             "seed": live.scene().render.seed,
         });
+        if turntable.is_some() {
+            statistics["frames"] = frames.into();
+        }
         output::statistics(path, &statistics)?;
     }
     if interrupted { Err(Failure::Interrupted) } else { Ok(()) }
@@ -189,10 +221,18 @@ fn resume(
     live.go_on_with(film).map_err(Failure::input)
 }
 
-/// Refines in slices of time until a stop condition is met, showing progress.
-fn refine(live: &mut LiveSession, stop: &StopConditions, cancel: &Arc<AtomicBool>, mut display: Display) {
+/// Refines in slices of time until a stop condition is met, showing progress, of which `about` says more.
+fn refine(
+    live: &mut LiveSession,
+    stop: &StopConditions,
+    cancel: &Arc<AtomicBool>,
+    mut display: Display,
+    about: Option<&str>,
+) {
     let begun = Instant::now();
-    let (first, at_first) = (live.film().first(), live.film().mean_samples());
+    let first = live.film().first();
+    // An edited scene still has the samples of the one before, which are dropped now.
+    let at_first = Some(live.film().mean_samples()).filter(|_| about.is_none()).unwrap_or(0.0);
     // A deadline that the clock cannot represent is no limit.
     let end = stop.time.and_then(|time| begun.checked_add(time));
     let mut last_estimate = begun;
@@ -232,7 +272,7 @@ fn refine(live: &mut LiveSession, stop: &StopConditions, cancel: &Arc<AtomicBool
         ];
         let share = shares.into_iter().flatten().fold(0.0, f64::max).min(1.0);
         let left = (share > 0.0).then(|| seconds * (1.0 - share) / share);
-        display.show(share, film.mean_samples(), left, error);
+        display.show(share, film.mean_samples(), left, error, about);
     }
     display.finish();
 }

@@ -20,7 +20,7 @@ pub fn run(options: &ReplayOptions) -> Result<(), Failure> {
     let threads = pool(options.run.threads)?;
     let level = vector_instructions()?;
     let mut input = Input::open(&options.input).map_err(Failure::input)?;
-    output::check(&options.outputs, options.run.stats.as_deref(), None)?;
+    output::check(&options.outputs, &[], options.run.stats.as_deref(), None)?;
     let edits = edits::read(&options.edits)?;
 
     overrides::lay_over(&mut input, &options.scene, options.samples)?;

@@ -28,7 +28,7 @@ pub fn run(options: &SheetOptions) -> Result<(), Failure> {
         let name = path_name(&options.output);
         return Err(Failure::usage(format!("-o {name}: a sheet is a PNG file; expected a name with .png")));
     }
-    output::check(std::slice::from_ref(&options.output), None, None)?;
+    output::check(std::slice::from_ref(&options.output), &[], None, None)?;
     let [width, height] = options.size;
     let too_large = || {
         Failure::usage(format!(

@@ -19,17 +19,65 @@ pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
         // Appended, because existing content must not be truncated: it may be a log.
         Destination::Stream => return OpenOptions::new().append(true).open(path)?.write_all(bytes),
     };
-    let (unfinished_path, mut file) = create_beside(&path)?;
-    let written = file.write_all(bytes).and_then(|()| file.sync_all());
-    drop(file);
-    let mut unfinished = unfinished();
-    unfinished.retain(|other| *other != unfinished_path);
-    let moved = written.and_then(|()| fs::rename(&unfinished_path, &path));
-    if moved.is_err() {
-        // The first failure is reported; a leftover that cannot be removed is at least not at `path`.
-        drop(fs::remove_file(&unfinished_path));
+    let mut replacement = Replacement::beside(path)?;
+    replacement.file.write_all(bytes)?;
+    replacement.finish()
+}
+
+/// A file that is written piece by piece and appears at its path, replacing what was there, once it is finished. Dropped before, it leaves
+/// nothing behind.
+#[derive(Debug)]
+pub struct Replacement {
+    path: PathBuf,
+    unfinished_path: PathBuf,
+    file: File,
+}
+
+impl Replacement {
+    /// Begins a file that is to be at `path`.
+    ///
+    /// # Errors
+    /// The system's error; devices and pipes are refused.
+    pub fn begin(path: &Path) -> Result<Self> {
+        match destination(path)? {
+            Destination::File(path) => Self::beside(path),
+            Destination::Stream => Err(Error::new(ErrorKind::InvalidInput, "it is a device or a pipe")),
+        }
     }
-    moved
+
+    /// Another handle of the file, for a writer that keeps what it writes to.
+    pub(crate) fn handle(&self) -> Result<File> {
+        self.file.try_clone()
+    }
+
+    fn beside(path: PathBuf) -> Result<Self> {
+        let (unfinished_path, file) = create_beside(&path)?;
+        Ok(Self { path, unfinished_path, file })
+    }
+
+    /// Puts the file at its path.
+    ///
+    /// # Errors
+    /// The system's error; no half-written file is left behind.
+    pub fn finish(self) -> Result<()> {
+        self.file.sync_all()?;
+        // Held while the file moves, so that an early end finds it either unfinished or at its path.
+        let mut unfinished = unfinished();
+        fs::rename(&self.unfinished_path, &self.path)?;
+        unfinished.retain(|other| *other != self.unfinished_path);
+        Ok(())
+    }
+}
+
+impl Drop for Replacement {
+    fn drop(&mut self) {
+        let mut unfinished = unfinished();
+        if unfinished.contains(&self.unfinished_path) {
+            unfinished.retain(|other| *other != self.unfinished_path);
+            // A leftover that cannot be removed is at least not at `path`.
+            drop(fs::remove_file(&self.unfinished_path));
+        }
+    }
 }
 
 /// Whether [`replace`] could put a file at `path`; leaves nothing behind.

@@ -53,7 +53,7 @@ pub struct LoadedScene {
 const BARE_THICKNESS: f32 = 200.0;
 
 /// Extensions of pictures.
-const PICTURES: [&str; 6] = ["png", "jpg", "jpeg", "tif", "tiff", "exr"];
+const PICTURES: [&str; 7] = ["png", "apng", "jpg", "jpeg", "tif", "tiff", "exr"];
 
 /// A key that every picture states; those of earlier versions lack it.
 const GRADIENT_RANGE: &str = "/medium/gradient_range";

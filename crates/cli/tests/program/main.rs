@@ -25,4 +25,5 @@ mod replay;
 mod scales;
 #[path = "../support/mod.rs"]
 mod support;
+mod turntable;
 mod wide_values;

@@ -25,6 +25,7 @@ use std::path::Path;
 use crate::atomic;
 use tyndall::film::{Backdrop, StateLayer, Tone};
 
+mod animation;
 mod display;
 mod error;
 mod exr;
@@ -37,6 +38,7 @@ mod radiance;
 mod texels;
 mod tiff;
 
+pub use animation::{Animation, AnimationHeader};
 pub use error::ImageError;
 pub use map::read_map;
 pub use memory::bytes_to_write;
@@ -102,6 +104,13 @@ pub fn write(path: &Path, picture: &Picture, tone: &Tone, metadata: &Metadata) -
     };
     let bytes = bytes.map_err(|failure| failure.at(path))?;
     atomic::replace(path, &bytes).map_err(|source| ImageError::unwritable(path, source))
+}
+
+/// The code values of a picture, three bytes a pixel, as a kind without opacity shows it: a transparent picture over white.
+#[must_use]
+pub fn codes(picture: &Picture, tone: &Tone) -> Vec<u8> {
+    picture.check();
+    display::rgb8(picture, tone)
 }
 
 /// Checks before a long render whether [`write()`] could write a picture there: the kind is known, the folder

@@ -1,9 +1,9 @@
 //! PNG: 8 bits, sRGB; straight alpha if the picture is transparent; metadata as compressed UTF-8 texts (iTXt).
 
-use std::io::{BufRead, Seek};
+use std::io::{BufRead, Seek, Write};
 
 use png::text_metadata::ITXtChunk;
-use png::{BitDepth, ColorType, Decoder, Encoder, EncodingError, SrgbRenderingIntent};
+use png::{BitDepth, ColorType, Decoder, Encoder, EncodingError, SrgbRenderingIntent, Writer};
 
 use super::error::EncodeFailure;
 use super::metadata::{Metadata, is_own};
@@ -18,16 +18,8 @@ pub(super) fn encode(picture: &Picture, tone: &Tone, metadata: &Metadata) -> Res
 
 fn try_encode(picture: &Picture, tone: &Tone, metadata: &Metadata) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
-    let mut encoder = Encoder::new(&mut bytes, picture.width, picture.height);
-    encoder.set_color(if picture.transparent { ColorType::Rgba } else { ColorType::Rgb });
-    encoder.set_depth(BitDepth::Eight);
-    encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
-    let mut writer = encoder.write_header()?;
-    for (key, text) in metadata.iter() {
-        let mut chunk = ITXtChunk::new(key, text);
-        chunk.compressed = true;
-        writer.write_text_chunk(&chunk)?;
-    }
+    let encoder = Encoder::new(&mut bytes, picture.width, picture.height);
+    let mut writer = begin(encoder, picture.transparent, metadata)?;
     let pixels = if picture.transparent {
         display::straight_rgba8(picture, tone)
     } else {
@@ -36,6 +28,24 @@ fn try_encode(picture: &Picture, tone: &Tone, metadata: &Metadata) -> Result<Vec
     writer.write_image_data(&pixels)?;
     writer.finish()?;
     Ok(bytes)
+}
+
+/// Writes what comes before the pixels.
+pub(super) fn begin<W: Write>(
+    mut encoder: Encoder<'_, W>,
+    transparent: bool,
+    metadata: &Metadata,
+) -> Result<Writer<W>, EncodingError> {
+    encoder.set_color(if transparent { ColorType::Rgba } else { ColorType::Rgb });
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    let mut writer = encoder.write_header()?;
+    for (key, text) in metadata.iter() {
+        let mut chunk = ITXtChunk::new(key, text);
+        chunk.compressed = true;
+        writer.write_text_chunk(&chunk)?;
+    }
+    Ok(writer)
 }
 
 pub(super) fn encode_codes([width, height]: [u32; 2], codes: &[[u8; 3]]) -> Result<Vec<u8>, EncodeFailure> {
