@@ -27,21 +27,21 @@ PICTURES = [
     ("mri-half", "Half a head: the cut shows the folds of the brain, the skin its own shine.", MRI,
      f"--integrator raymarch {plane([-5, 0, 0], [-1, 0, 0])} {view(-55, 15, 1.2)}"),
     ("mri-crown", "The same under all orders of scattering, cut above the eyes.", MRI,
-     f"--samples 300 {plane([0, 10, 40], [0, -0.5, 1])} {view(20, 30, 1.3)}"),
-    ("mri-head", "What a bare file gets.", MRI, "--samples 200"),
-    ("mri-phantom", "Brain and eyes in blue glass.", MRI, "--samples 400 --look phantom"),
-    ("chest", "What a bare file gets: bone, and vessels with contrast agent.", CHEST, "--samples 400"),
+     f"--samples 160 {plane([0, 10, 40], [0, -0.5, 1])} {view(20, 30, 1.3)}"),
+    ("mri-head", "What a bare file gets.", MRI, "--samples 100"),
+    ("mri-phantom", "Brain and eyes in blue glass.", MRI, "--samples 200 --look phantom"),
+    ("chest", "What a bare file gets: bone, and vessels with contrast agent.", CHEST, "--samples 200"),
     ("chest-ivory", "Bone as ivory.", CHEST, f"--look ivory {view(25, 5)}"),
-    ("chest-atlas", "Bone on paper.", CHEST, f"--look atlas {view(-25, 5)}"),
+    ("chest-atlas", "Bone on paper.", CHEST, f"--look atlas {view(25, 5)}"),
     ("chest-angio", "Vessels with contrast agent, from the left.", CHEST, f"--look angio {view(60, 10)}"),
     ("chest-anatomy", "Muscle, with the fat removed.", CHEST, f"--look anatomy {view(30, 10)}"),
-    ("chest-glass", "Bone within skin of glass.", CHEST, "--samples 400 --look glass"),
-    ("chest-lungs", "Lungs under a veil of skin.", CHEST, "--samples 300 --look lungs"),
-    ("rock", "Sandstone in raking light.", ROCK, f"--samples 300 --look stone {view(35, 25)}"),
-    ("rock-paper", "The same on paper, by single scattering.", ROCK, f"--integrator raymarch --look paper {view(-35, 30)}"),
-    ("cloud-smoke", "A generated cloud between a warm and a cool light.", CLOUD, "--samples 400 --look smoke"),
-    ("cloud-veils", "The same as four veils.", CLOUD, "--samples 400 --look veils"),
-    ("cloud-dye", "The same as glowing dye.", CLOUD, "--samples 200 --look dye"),
+    ("chest-glass", "Bone within skin of glass.", CHEST, "--samples 200 --look glass"),
+    ("chest-lungs", "Lungs under a veil of skin.", CHEST, "--samples 150 --look lungs"),
+    ("rock", "Sandstone in raking light.", ROCK, f"--samples 120 --look stone {view(35, 25)}"),
+    ("rock-paper", "The same on paper, by single scattering.", ROCK, f"--integrator raymarch --look paper {view(35, 30)}"),
+    ("cloud-smoke", "A generated cloud between a warm and a cool light.", CLOUD, "--samples 200 --look smoke"),
+    ("cloud-veils", "The same as four veils.", CLOUD, "--samples 200 --look veils"),
+    ("cloud-dye", "The same as glowing dye.", CLOUD, "--samples 64 --look dye"),
 ]
 
 
@@ -57,17 +57,25 @@ def main():
              "of two cores. Where the data come from: [SOURCES.md](images/SOURCES.md).", ""]
     for name, text, source, options in PICTURES:
         path = ROOT / source if (ROOT / source).exists() else data / source
-        command = ["render", source, *shlex.split(options), "--size", "480x480", "-o", f"{name}.jpg"]
+        command = ["render", source, *shlex.split(options), "--size", "400x400", "-o", f"{name}.jpg"]
         asked = [str(path) if word == source else word for word in command]
         asked[-1] = str(folder / asked[-1])
         if quick:
             asked = ["4" if before == "--samples" else word for before, word in zip([""] + asked, asked)]
-            asked[asked.index("480x480")] = "24x24"
+            asked[asked.index("400x400")] = "24x24"
+        # A link, so that the metadata name the file and not where it lies here.
+        link = folder / pathlib.Path(source).name
+        if not (ROOT / source).exists():
+            link.unlink(missing_ok=True)
+            link.symlink_to(path.resolve())
+            asked[1] = str(link)
         begun = time.time()
         subprocess.run([TYNDALL, *asked, "--quiet"], check=True)
         seconds = time.time() - begun
+        if link.is_symlink():
+            link.unlink()
         print(f"{name}: {seconds:.0f} s")
-        shown = " ".join(["tyndall render", source, options, "--size", "480x480", "-o", f"{name}.jpg"])
+        shown = " ".join(["tyndall render", source, options, "--size", "400x400", "-o", f"{name}.jpg"])
         lines += [f"![{text}](gallery/{name}.jpg)", "", f"{text} {seconds:.0f} s.", "", "```sh", shown, "```", ""]
     if not quick:
         (ROOT / "docs/gallery.md").write_text("\n".join(lines))

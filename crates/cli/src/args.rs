@@ -73,8 +73,8 @@ pub enum Command {
 pub struct RenderOptions {
     /// A scene (.toml, .json), a picture that Tyndall made, or a volume: NRRD, NIfTI, MetaImage, NumPy
     ///
-    /// A bare volume gets a preset fit to its kind, a density of 200 / box diagonal, and an automatic camera and
-    /// lights. A picture is rendered again from the scene in its metadata.
+    /// A bare volume gets a preset fit to its kind, a density of 200 / box diagonal, an automatic camera, and unless --look is given
+    /// the look `night`. A picture is rendered again from the scene in its metadata.
     pub input: PathBuf,
 
     /// Write the picture to FILE: .png .jpg .tif (tone-mapped, 8 bit) or .exr (linear float); repeatable
