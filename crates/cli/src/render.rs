@@ -74,7 +74,8 @@ pub fn run(options: &RenderOptions, started: Instant) -> Result<(), Failure> {
         output::look(path, &look)?;
     }
     if !options.run.quiet {
-        let of_outputs = output::notes(&paths, live.document());
+        let shown = turntable.as_ref().map_or_else(|| paths.clone(), Turntable::first_pictures);
+        let of_outputs = output::notes(&shown, live.document());
         for text in live.notes().iter().chain(&of_outputs) {
             drop(writeln!(std::io::stderr(), "tyndall: note: {}", sentence(text)));
         }
@@ -230,9 +231,7 @@ fn refine(
     about: Option<&str>,
 ) {
     let begun = Instant::now();
-    let first = live.film().first();
-    // An edited scene still has the samples of the one before, which are dropped now.
-    let at_first = Some(live.film().mean_samples()).filter(|_| about.is_none()).unwrap_or(0.0);
+    let (first, at_first) = (live.film().first(), live.film().mean_samples());
     // A deadline that the clock cannot represent is no limit.
     let end = stop.time.and_then(|time| begun.checked_add(time));
     let mut last_estimate = begun;

@@ -34,7 +34,7 @@ const MOST_DIGITS: usize = 9;
 impl Pattern {
     fn parse(text: &str) -> Option<Self> {
         let (before, rest) = text.split_once('{')?;
-        let (inside, after) = rest.split_once('}')?;
+        let (inside, after) = rest.split_once('}').filter(|(_, after)| !after.contains(['{', '}']))?;
         let digits = match inside.strip_prefix(':') {
             None if inside.is_empty() => 1,
             None => return None,
@@ -111,6 +111,11 @@ impl Turntable {
             .iter()
             .flat_map(|output| frames.clone().filter_map(move |frame| output.picture(frame)))
             .collect()
+    }
+
+    /// The pictures of the first frame.
+    pub fn first_pictures(&self) -> Vec<PathBuf> {
+        self.outputs.iter().filter_map(|output| output.picture(0)).collect()
     }
 
     /// The films that will be written.
@@ -219,7 +224,7 @@ mod tests {
         assert_eq!(at("a/turn_{:04}.png", 7), Some("a/turn_0007.png".into()));
         assert_eq!(at("{}.exr", 12345), Some("12345.exr".into()));
         assert_eq!(at("t{:2}.png", 123), Some("t123.png".into()));
-        for bad in ["a.png", "{x}.png", "{:x}.png", "{:0}.png", "{:99}.png", "}{.png", "{"] {
+        for bad in ["a.png", "{x}.png", "{:x}.png", "{:0}.png", "{:99}.png", "}{.png", "{", "{}{}.png"] {
             assert_eq!(Pattern::parse(bad), None, "{bad}");
         }
     }

@@ -48,7 +48,10 @@ impl Orbit {
             "up": turned(self.up).as_vec3().to_array(),
         });
         match self.lens {
-            Lens::Perspective { focus, .. } => camera["focus"] = json!(focus),
+            // The zoom of an automatic camera narrows its field of view.
+            Lens::Perspective { fov, focus, .. } => {
+                (camera["fov"], camera["focus"]) = (json!(fov), json!(focus));
+            }
             Lens::Orthographic { height } => camera["height"] = json!(height),
         }
         json!({ "camera": camera })

@@ -1,8 +1,10 @@
 //! Pictures and films of a volume that turns.
 
 use crate::gradients::scene_of;
+use crate::looks::options;
 use crate::support::{Ended, Folder, files_in_out, json, run, written};
 use std::io::Cursor;
+use tyndall_live::LiveSession;
 
 const SCENE: &str = "volume.procedural = { kind = 'cloud', size = [16, 16, 16] }\nfilm.size = [21, 13]\nrender.samples = 2\n\
                      render.photon.photons = 5000\nlights = [{ type = 'directional', direction = [1, -1, 0], irradiance = 9 }]\n";
@@ -36,6 +38,17 @@ fn every_frame_is_a_picture_of_its_own() {
             assert!(written(&folder, "f00.png") != written(&folder, "f01.png"), "{}", method.name);
         }
     }
+}
+
+/// An automatic camera is zoomed by its field of view, which must not change after the first frame.
+#[test]
+fn zoom_stays() {
+    let folder = folder(&format!("camera.auto.zoom = 2.5\n{SCENE}"));
+    run(&folder, &["render", "../a.toml", "--turntable", "2", "--stats", "s.json", "-o", "f{}.exr"]);
+    let lens = |file: &str| {
+        LiveSession::open(&folder.at("out").join(file), options()).expect(file).scene().camera.lens()
+    };
+    assert_eq!(lens("f0.exr"), lens("f1.exr"));
 }
 
 #[test]
