@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::option_values::{positive, seconds, share, size};
 use crate::parts::Share;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args as Group, Parser, Subcommand, ValueEnum, value_parser};
@@ -350,34 +351,6 @@ fn methods() -> PossibleValuesParser {
     METHODS.iter().map(|method| PossibleValue::new(method.name).help(method.about)).collect::<Vec<_>>().into()
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
-    let side = |s: &str| s.parse::<u32>().ok().filter(|&n| n > 0);
-    text.split_once(['x', 'X'])
-        .and_then(|(w, h)| Some([side(w)?, side(h)?]))
-        .ok_or_else(|| "expected WxH with whole numbers of at least 1, e.g. 512x512".into())
-}
-
-fn share(text: &str) -> Result<Share, String> {
-    let numbers =
-        text.split_once('/').and_then(|(number, count)| Some([number.parse().ok()?, count.parse().ok()?]));
-    numbers
-        .map(|[number, count]| Share { number, count })
-        .filter(|share| (1..=share.count).contains(&share.number))
-        .ok_or_else(|| "expected K/N with whole numbers, K from 1 to N, e.g. 2/4".into())
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|x: &f64| x.is_finite() && *x > 0.0)
-        .ok_or_else(|| "expected a number above 0".into())
-}
-
-/// More seconds than the clock can count mean no limit.
-fn seconds(text: &str) -> Result<Duration, String> {
-    positive(text).map(|x| Duration::try_from_secs_f64(x).unwrap_or(Duration::MAX))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -387,21 +360,6 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Args::command().debug_assert();
-        assert_eq!(size("640x480"), Ok([640, 480]));
-        for bad in ["640", "0x4", "x", "4x-1", "axb"] {
-            assert!(size(bad).is_err(), "{bad}");
-        }
-        assert_eq!(share("2/4"), Ok(Share { number: 2, count: 4 }));
-        for bad in ["0/4", "5/4", "1", "1/", "/", "1/0", "-1/2", "1/2/3", "a/b"] {
-            assert!(share(bad).is_err(), "{bad}");
-        }
-        assert!(positive("nan").is_err() && positive("0").is_err() && positive("0.5") == Ok(0.5));
-    }
-    #[test]
-    fn seconds_are_never_too_many() {
-        assert_eq!(seconds("1.5"), Ok(Duration::from_millis(1500)));
-        assert_eq!(seconds("1e300"), Ok(Duration::MAX));
-        assert!(seconds("inf").is_err() && seconds("-1").is_err());
     }
 
     #[test]

@@ -55,14 +55,14 @@ impl Output {
         if extension == "apng" {
             return Ok(Self::Animation(path.to_owned()));
         }
-        if Video::EXTENSIONS.contains(&extension.as_str()) {
+        if Video::is_video(path) {
             return Ok(Self::Video(path.to_owned()));
         }
         path.to_str().and_then(Pattern::parse).map(Self::Sequence).ok_or_else(|| {
             Failure::usage(format!(
-                "-o {}: --turntable makes many pictures; expected a name with a place for their number, such as turn_{{:04}}.png, or a film: .apng, .{}",
+                "-o {}: --turntable makes many pictures; expected a name with a place for their number, such as turn_{{:04}}.png, or a film: .apng, {}",
                 path_name(path),
-                Video::EXTENSIONS.join(", .")
+                Video::extensions()
             ))
         })
     }
@@ -93,9 +93,7 @@ impl Turntable {
     pub fn new(frames: u32, fps: u16, asked: &[PathBuf], input: &Path) -> Result<Self, Failure> {
         let paths = output::paths(asked, input, "apng")?;
         let outputs = paths.iter().map(|path| Output::parse(path)).collect::<Result<Vec<_>, _>>()?;
-        if let Some(Output::Video(path)) = outputs.iter().find(|output| matches!(output, Output::Video(_))) {
-            Video::check(path)?;
-        }
+        outputs.iter().filter_map(Output::film).try_for_each(Video::check)?;
         Ok(Self { frames, fps, outputs })
     }
 
@@ -123,10 +121,11 @@ impl Turntable {
         self.outputs.iter().filter_map(Output::film).map(Path::to_owned).collect()
     }
 
-    /// Renders each frame and writes it. `refine` renders the session's picture until it is to be shown.
+    /// Renders each frame and writes it; if an end is requested, the pictures so far stay, and films have their frames. `refine` renders the
+    /// session's picture until it is to be shown.
     ///
     /// # Errors
-    /// [`Failure`] if a file cannot be written; [`Failure::Interrupted`] if an end was requested: the pictures so far and videos of them are then kept.
+    /// [`Failure`] if a file cannot be written.
     pub fn render(
         &self,
         live: &mut LiveSession,
@@ -151,13 +150,11 @@ impl Turntable {
                 live.edit(&serde_json::json!({ "film": { "exposure": stops } })).map_err(Failure::input)?;
             }
         }
-        for video in films.videos {
-            video.finish()?;
-        }
-        if interrupt.is_requested() {
-            return Err(Failure::Interrupted);
-        }
-        films.animations.into_iter().try_for_each(Animation::finish).map_err(Failure::input)
+        // All of them, even if one fails.
+        let videos: Vec<_> = films.videos.into_iter().map(Video::finish).collect();
+        let animations: Vec<_> = films.animations.into_iter().map(Animation::finish).collect();
+        videos.into_iter().collect::<Result<(), _>>()?;
+        animations.into_iter().collect::<Result<(), _>>().map_err(Failure::input)
     }
 
     /// Writes a frame to all outputs, which begin with the first.

@@ -185,6 +185,34 @@ fn an_interrupted_render_leaves_a_readable_picture() {
     assert!((1..2_000_000_000).contains(&samples), "{samples}");
 }
 
+/// Ctrl-C in the middle of a film: the animation has the frames that were whole, and says how many they are.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_film_has_the_frames_so_far() {
+    let folder = with_scene();
+    let arguments =
+        ["render", "../scene.toml", "--turntable", "100000", "-v", "-o", "a.apng", "--stats", "s.json"];
+    let mut child = folder.tyndall(&arguments).stderr(Stdio::piped()).spawn().expect("the program starts");
+    let mut stderr = BufReader::new(child.stderr.take().expect("a pipe"));
+    let mut line = String::new();
+    stderr.read_line(&mut line).expect("a line");
+    // Long enough for a frame, and far from enough for all.
+    std::thread::sleep(Duration::from_millis(500));
+    interrupted((child, stderr));
+    assert_eq!(files_in_out(&folder), ["a.apng", "s.json"]);
+    let bytes = written(&folder, "a.apng");
+    let mut reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().expect("a PNG");
+    let stated = reader.info().animation_control().expect("an animation").num_frames;
+    assert!((1..100_000).contains(&stated), "{stated}");
+    let mut pixels = vec![0; reader.output_buffer_size().expect("a size")];
+    for frame in 0..stated {
+        reader.next_frame(&mut pixels).unwrap_or_else(|e| panic!("frame {frame} of {stated}: {e}"));
+    }
+    assert!(reader.next_frame(&mut pixels).is_err(), "more than {stated} frames");
+    let statistics: serde_json::Value = serde_json::from_slice(&written(&folder, "s.json")).expect("JSON");
+    assert_eq!(statistics["frames"].as_array().map(Vec::len), Some(stated as usize));
+}
+
 /// Light paths of up to a million scatterings in white, dense matter: minutes before there is a first picture.
 #[cfg(unix)]
 #[test]

@@ -45,6 +45,12 @@ impl Replacement {
         }
     }
 
+    /// Where the unfinished file is, for a program that writes it.
+    #[must_use]
+    pub fn unfinished_path(&self) -> &Path {
+        &self.unfinished_path
+    }
+
     /// Another handle of the file, for a writer that keeps what it writes to.
     pub(crate) fn handle(&self) -> Result<File> {
         self.file.try_clone()

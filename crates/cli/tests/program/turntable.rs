@@ -1,5 +1,6 @@
 //! Pictures and films of a volume that turns.
 
+use crate::data::Data;
 use crate::gradients::scene_of;
 use crate::looks::options;
 use crate::support::{Ended, Folder, files_in_out, json, run, written};
@@ -15,20 +16,29 @@ fn folder(scene: &str) -> Folder {
     folder
 }
 
-/// The first frame is the picture without the option, and each is what its own metadata give, whatever was kept from the one before.
+/// The first frame is the picture without the option, and each is what its own metadata give, whatever was kept from the one before, on any
+/// number of threads and far from the origin.
 #[test]
 fn every_frame_is_a_picture_of_its_own() {
+    const CLOUD: &str = "volume.procedural = { kind = 'cloud', size = [16, 16, 16] }";
+    let orthographic =
+        "camera = { type = 'orthographic', position = [40, 9, 2], up = [0, 1, 0.3], height = 30 }\n";
+    let far = SCENE.replace(CLOUD, "volume.path = 'far.nrrd'");
+    let ball = Data::new(16, |[x, y, z]| (1.0 - x * x - y * y - z * z).max(0.0));
+    let far_away = Data { origin: [2e6, -7e5, 3e5], ..ball }.nrrd("float");
     for method in tyndall::integrator::METHODS {
-        for camera in
-            ["", "camera = { type = 'orthographic', position = [40, 9, 2], up = [0, 1, 0.3], height = 30 }\n"]
-        {
-            let folder = folder(&format!("{camera}{SCENE}"));
+        for scene in [SCENE, &format!("{orthographic}{SCENE}"), &far] {
+            let folder = folder(scene);
+            folder.put("far.nrrd", &far_away);
             let render = ["render", "../a.toml", "--integrator", method.name];
-            run(&folder, &[&render[..], &["--turntable", "3", "-o", "f{:02}.png", "-q"]].concat());
+            run(
+                &folder,
+                &[&render[..], &["--turntable", "3", "--threads", "2", "-o", "f{:02}.png", "-q"]].concat(),
+            );
             run(&folder, &[&render[..], &["-o", "plain.png", "-q"]].concat());
             assert_eq!(written(&folder, "f00.png"), written(&folder, "plain.png"), "{}", method.name);
             for frame in ["f00.png", "f01.png", "f02.png"] {
-                run(&folder, &["render", frame, "-o", "again.png", "-q"]);
+                run(&folder, &["render", frame, "--threads", "1", "-o", "again.png", "-q"]);
                 assert!(
                     written(&folder, frame) == written(&folder, "again.png"),
                     "{frame} by {}",
@@ -150,18 +160,19 @@ fn a_video_is_made_by_ffmpeg() {
     use std::os::unix::fs::PermissionsExt;
     let folder = folder(SCENE);
     let stand_in = |text: &str| {
-        folder.put("bin/ffmpeg", format!("#!/bin/sh\nif [ \"$1\" = -version ]; then exit 0; fi\n{text}\n"));
+        let listed = "if [ \"$2\" = -encoders ]; then echo ' V libx264 H.264'; exit 0; fi";
+        folder.put("bin/ffmpeg", format!("#!/bin/sh\n{listed}\n{text}\n"));
         let executable = std::fs::Permissions::from_mode(0o755);
         std::fs::set_permissions(folder.at("bin/ffmpeg"), executable).expect("permissions");
     };
-    let film = || {
-        let mut command =
-            folder.tyndall(&["render", "../a.toml", "--turntable", "3", "--fps", "30", "-o", "t.mp4"]);
+    let film = |name: &str| {
+        let turntable = ["render", "../a.toml", "--turntable", "3", "--fps", "30", "-o", name];
+        let mut command = folder.tyndall(&turntable);
         let path = format!("{}:{}", folder.at("bin").display(), std::env::var("PATH").unwrap_or_default());
         command.env("PATH", path).output().expect("the program runs")
     };
     stand_in("for last; do :; done\necho \"$*\" > arguments\ncat > \"$last\"");
-    let ended = film();
+    let ended = film("t.mp4");
     assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stderr));
     assert_eq!(written(&folder, "t.mp4").len(), 3 * 21 * 13 * 3);
     let arguments = String::from_utf8(written(&folder, "arguments")).expect("text");
@@ -169,9 +180,13 @@ fn a_video_is_made_by_ffmpeg() {
     assert_eq!(files_in_out(&folder), ["arguments", "t.mp4"]);
     std::fs::remove_file(folder.at("out/t.mp4")).expect("a file");
     stand_in("cat > /dev/null\necho 'no such codec' >&2\nexit 3");
-    let ended = film();
+    let ended = film("t.mp4");
     let stderr = String::from_utf8_lossy(&ended.stderr);
     assert_eq!(ended.status.code(), Some(1), "{stderr}");
     assert!(stderr.contains("t.mp4") && stderr.contains("no such codec"), "{stderr}");
     assert_eq!(files_in_out(&folder), ["arguments"]);
+    let ended = film("t.webm");
+    let stderr = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains("libvpx-vp9, which it lacks"), "{stderr}");
 }

@@ -4,8 +4,9 @@ use super::error::EncodeFailure;
 use super::{ImageError, Metadata, Picture, Tone, display, png};
 use crate::atomic::Replacement;
 use ::png::{Encoder, EncodingError, Writer};
+use flate2::Crc;
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// An animated PNG that is being written; only the current frame is in memory. It appears at its path when it is finished.
@@ -65,19 +66,46 @@ impl Animation {
         Ok(())
     }
 
-    /// Puts the file at its path; all frames must have been added.
+    /// Puts the file at its path, with as many frames as were added; without any nothing is written.
     ///
     /// # Errors
-    /// [`ImageError`] if the file cannot be written, or lacks frames.
+    /// [`ImageError`] if the file cannot be written.
     pub fn finish(self) -> Result<(), ImageError> {
         let Self { path, file, writer, header, added } = self;
-        if added < header.frames {
-            let reason = format!("{added} frames of {}", header.frames);
-            return Err(ImageError::Encode { path, reason });
-        }
         writer.finish().map_err(|error| failure(&path, &error))?;
-        file.finish().map_err(|source| ImageError::unwritable(&path, source))
+        let finish = || match added {
+            0 => Ok(()),
+            _ if added == header.frames => file.finish(),
+            _ => state_frames(&file, added).and_then(|()| file.finish()),
+        };
+        finish().map_err(|source| ImageError::unwritable(&path, source))
     }
+}
+
+/// Corrects the number of frames that a finished animation states in its chunk `acTL`, which is before the first frame.
+fn state_frames(file: &Replacement, frames: u32) -> std::io::Result<()> {
+    const SIGNATURE: u64 = 8;
+    let mut chunks = File::options().read(true).write(true).open(file.unfinished_path())?;
+    let mut at = SIGNATURE;
+    loop {
+        chunks.seek(SeekFrom::Start(at))?;
+        let mut head = [0; 8];
+        chunks.read_exact(&mut head)?;
+        let [a, b, c, d, name @ ..] = head;
+        if name == *b"acTL" {
+            break;
+        }
+        // The data follow, and a checksum.
+        at += u64::from(u32::from_be_bytes([a, b, c, d])) + 12;
+    }
+    // Endless repetitions are 0.
+    let [frames, repetitions] = [frames, 0_u32].map(u32::to_be_bytes);
+    let data = [frames, repetitions].concat();
+    let mut checksum = Crc::new();
+    checksum.update(b"acTL");
+    checksum.update(&data);
+    chunks.write_all(&data)?;
+    chunks.write_all(&checksum.sum().to_be_bytes())
 }
 
 fn failure(path: &Path, error: &EncodingError) -> ImageError {
