@@ -189,28 +189,6 @@ mod tests {
     }
 
     #[test]
-    fn a_replacement_appears_when_it_is_finished_and_leaves_nothing_otherwise() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.apng");
-        fs::write(&path, "before").unwrap();
-        let replacement = Replacement::begin(&path).unwrap();
-        replacement.handle().unwrap().write_all(b"half").unwrap();
-        assert_eq!(names(folder.path()).len(), 2);
-        drop(replacement);
-        assert_eq!(
-            (names(folder.path()), fs::read(&path).unwrap()),
-            (vec!["a.apng".to_owned()], b"before".to_vec())
-        );
-        let replacement = Replacement::begin(&path).unwrap();
-        replacement.handle().unwrap().write_all(b"whole").unwrap();
-        replacement.finish().unwrap();
-        assert_eq!(
-            (names(folder.path()), fs::read(&path).unwrap()),
-            (vec!["a.apng".to_owned()], b"whole".to_vec())
-        );
-    }
-
-    #[test]
     fn nothing_unfinished_outlives_an_early_end() {
         let folder = tempfile::tempdir().unwrap();
         let (_, mut file) = create_beside(&folder.path().join("a.png")).unwrap();

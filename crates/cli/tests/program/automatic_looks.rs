@@ -24,6 +24,9 @@ fn colors(folder: &Folder, file: &str, look: &Look) -> [f64; 3] {
     [0, 1, 2].map(|c| covered.iter().map(|code| f64::from(code[c])).sum::<f64>() / covered.len() as f64)
 }
 
+/// Code values by which means may differ: noise of 32 samples made it 4.7 at most, and a function that does not adapt made it 42.
+const APART: f64 = 8.0;
+
 /// The same matter in another range of values, at another spacing, and stored along other axes.
 #[test]
 fn a_look_is_the_same_over_the_next_volume_of_its_kind() {
@@ -42,7 +45,7 @@ fn a_look_is_the_same_over_the_next_volume_of_its_kind() {
         for look in LOOKS.iter().filter(|look| look.suits(preset)) {
             let [a, b] = ["a.nrrd", "b.nrrd"].map(|file| colors(&folder, file, look));
             for c in 0..3 {
-                assert!((a[c] - b[c]).abs() < 12.0, "{} over {preset}: {a:.0?} and {b:.0?}", look.name);
+                assert!((a[c] - b[c]).abs() < APART, "{} over {preset}: {a:.0?} and {b:.0?}", look.name);
             }
         }
     }
